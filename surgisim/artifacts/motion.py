@@ -1,0 +1,37 @@
+"""Where grasped tissue went: the boundary condition of a replay."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from surgisim.artifacts.base import Artifact, check
+
+
+@dataclass(frozen=True)
+class Motion(Artifact):
+    """J grips, each a ball of tissue that is carried without turning while it is active."""
+
+    center_rest: np.ndarray
+    """Centre of the gripped ball in frame 0, camera frame [m], (J, 3)."""
+    radius: np.ndarray
+    """Its radius [m], (J,)."""
+    position: np.ndarray
+    """Where its centre is carried, camera frame [m], (J, T, 3)."""
+    active: np.ndarray
+    """Whether the instrument holds it, (J, T) bool."""
+    confidence: np.ndarray
+    """How sure we are that this is a grasp, 0-1, (J,)."""
+    source: Literal["found", "given", "none"]
+
+    UNITS = {"center_rest": "m", "radius": "m", "position": "m", "confidence": "1"}
+
+    def __post_init__(self) -> None:
+        j = self.center_rest.shape[0]
+        t = self.active.shape[-1]
+        shapes = [self.center_rest.shape, self.radius.shape, self.position.shape, self.active.shape]
+        check(
+            shapes == [(j, 3), (j,), (j, t, 3), (j, t)],
+            f"Motion: shapes {shapes} do not fit; (J, 3), (J,), (J, T, 3), (J, T) are wanted.",
+        )
+        check(bool(np.all(np.isfinite(self.position))), "Motion: position must be finite.")

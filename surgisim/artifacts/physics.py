@@ -1,0 +1,24 @@
+"""The laws of a body with their numbers, and the discretisation they were fitted with."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from surgisim.artifacts.base import JsonArtifact, check
+
+
+@dataclass(frozen=True)
+class Physics(JsonArtifact):
+    terms: dict[str, dict[str, dict[str, Any]]]
+    """Law -> parameter -> {"value", "unit"} and, where known, "low", "high", "identifiable"."""
+    density: float
+    """[kg/m^3]"""
+    gravity: list[float]
+    """Camera frame [m/s^2], 3 numbers."""
+    grid: dict[str, float]
+    """{"spacing" [m], "step" [s]}: fitted numbers hold for these and travel with them."""
+
+    UNITS = {"density": "kg/m^3", "gravity": "m/s^2"}
+
+    def __post_init__(self) -> None:
+        check(self.density > 0, f"Physics: density {self.density} must be > 0.")
+        check(set(self.grid) == {"spacing", "step"}, f"Physics: grid has {sorted(self.grid)}, not spacing and step.")
