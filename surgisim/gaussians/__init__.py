@@ -1,0 +1,1 @@
+"""The scene as 3D Gaussians: how they are made, seen and kept in shape."""
