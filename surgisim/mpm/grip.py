@@ -1,0 +1,73 @@
+"""The driven region: which particles a grip holds, and the path it carries them along."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from surgisim.artifacts.motion import Motion
+from surgisim.problem import Problem
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Anchor 0 is the held boundary; anchors 1 to J are the grips."""
+
+    member: np.ndarray
+    """Bit a is set where anchor a holds the particle, (P,) int32."""
+    path: np.ndarray
+    """Displacement of each anchor at every step and after the last [m], (1 + J, S + 1, 3)."""
+    active: np.ndarray
+    """Whether the anchor holds during each step, (1 + J, S) bool."""
+    step: float
+    """[s]"""
+    per_frame: int
+    """Steps between two frames."""
+
+    @property
+    def steps(self) -> int:
+        return self.active.shape[1]
+
+    @property
+    def frames(self) -> int:
+        """Frames the run ends up with, the first at rest."""
+        return self.steps // self.per_frame + 1
+
+
+def drive(
+    motion: Motion, rest: np.ndarray, held: np.ndarray, *, fps: float, per_frame: int, frames: int | None = None
+) -> Drive:
+    """The boundary condition of a replay of `motion` on particles `rest` [m], (P, 3).
+
+    Between frames the path is a monotone cubic (Fritsch and Carlson, 1980), so the instrument does
+    not jerk at every frame; before and after its active frames a grip holds nothing.
+    Raises Problem if a grip holds no particle, or more than 31 grips are asked for.
+    """
+    grips, motion_frames = motion.active.shape if len(motion.active) else (0, frames or motion.active.shape[-1])
+    frames = frames or motion_frames
+    steps, step = (frames - 1) * per_frame, 1.0 / fps / per_frame
+    if grips > 30:
+        raise Problem(f"motion: {grips} grips, but at most 30 can be simulated at once. Keep the ones that matter.")
+    member = held.astype(np.int32)
+    path = np.zeros((1 + grips, steps + 1, 3))
+    active = np.zeros((1 + grips, steps), bool)
+    active[0] = True
+    clock = np.arange(steps + 1) / per_frame
+    for j in range(grips):
+        near = np.linalg.norm(rest - motion.center_rest[j], axis=1) <= motion.radius[j]
+        if not near.any():
+            where = np.round(motion.center_rest[j], 4).tolist()
+            gap = np.linalg.norm(rest - motion.center_rest[j], axis=1).min()
+            raise Problem(
+                f"motion: grip {j} at {where} m with radius {motion.radius[j]:.4f} m lies outside the body; "
+                f"the nearest tissue is {gap:.4f} m away. Move the grip, or enlarge its radius."
+            )
+        member |= near.astype(np.int32) << (1 + j)
+        offset = motion.position[j] - motion.center_rest[j]
+        at = np.minimum(clock, len(offset) - 1)
+        path[1 + j] = PchipInterpolator(np.arange(len(offset)), offset)(at) if len(offset) > 1 else offset[0]
+        # Held from the first active frame until the last: a release between two frames is the later one's.
+        on = motion.active[j].astype(bool)
+        frame = np.minimum(np.arange(steps) // per_frame, len(on) - 1)
+        active[1 + j] = on[frame] & on[np.minimum(frame + 1, len(on) - 1)]
+    return Drive(member, path, active, step, per_frame)

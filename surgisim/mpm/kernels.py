@@ -1,0 +1,245 @@
+"""One step of the total-Lagrangian method and its adjoint, on the device.
+
+    F_p = I + sum_i u_i (x) dw_ip,   Fdot_p = sum_i v_i (x) dw_ip
+    f_i = -sum_p V_p P(F_p, Fdot_p) dw_ip + sum_p w_ip b_p
+    v_i <- v_i + dt (f_i / m_i + g),   u_i <- u_i + dt v_i             (symplectic Euler)
+
+b_p holds anchored particles (a grip, the base) to their path by a spring and a damper per unit of
+mass, so that the constraint acts on the interpolated motion of the driven volume itself and not on
+whole nodes, which would widen it by up to a cell. Both passes only gather: every node sums over its own links in a fixed order,
+so results do not depend on the number of threads.
+
+State lives in a ring of slots, (L, N): slot n % L is read and slot (n + 1) % L written, which
+serves a plain run (L = 2) and a recorded segment (L = steps + 1) alike.
+"""
+
+from functools import lru_cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from surgisim.physics.catalogue import choose
+from surgisim.physics.fold import fold, gather, power
+
+LINKS = 27
+
+
+@wp.func
+def kinematics(
+    u: wp.array2d(dtype=wp.vec3),
+    v: wp.array2d(dtype=wp.vec3),
+    index: wp.array2d(dtype=int),
+    link: wp.array2d(dtype=wp.vec4),
+    slot: int,
+    p: int,
+):
+    F = wp.identity(n=3, dtype=float)
+    Fdot = wp.mat33()
+    for k in range(27):
+        i = index[p, k]
+        w = link[p, k]
+        g = wp.vec3(w[1], w[2], w[3])
+        F += wp.outer(u[slot, i], g)
+        Fdot += wp.outer(v[slot, i], g)
+    return F, Fdot
+
+
+@wp.func
+def carried(
+    u: wp.array2d(dtype=wp.vec3),
+    index: wp.array2d(dtype=int),
+    link: wp.array2d(dtype=wp.vec4),
+    slot: int,
+    p: int,
+):
+    total = wp.vec3()
+    for k in range(27):
+        total += link[p, k][0] * u[slot, index[p, k]]
+    return total
+
+
+@wp.struct
+class Anchors:
+    """Which particles are held to which path, and how stiffly."""
+
+    member: wp.array(dtype=int)
+    path: wp.array2d(dtype=wp.vec3)
+    active: wp.array2d(dtype=int)
+    stiffness: float
+    damping: float
+    step: float
+
+
+@wp.kernel
+def node_step(
+    clock: wp.array(dtype=int),
+    start: wp.array(dtype=int),
+    entry: wp.array(dtype=int),
+    link: wp.array2d(dtype=wp.vec4),
+    stress: wp.array(dtype=wp.mat33),
+    push: wp.array(dtype=wp.vec3),
+    mass: wp.array(dtype=float),
+    gravity: wp.vec3,
+    dt: float,
+    slots: int,
+    u: wp.array2d(dtype=wp.vec3),
+    v: wp.array2d(dtype=wp.vec3),
+):
+    i = wp.tid()
+    n = clock[0]
+    here = n % slots
+    there = (n + 1) % slots
+    force = wp.vec3()
+    for e in range(start[i], start[i + 1]):
+        p = entry[e] / LINKS
+        w = link[p, entry[e] - p * LINKS]
+        force += w[0] * push[p] - stress[p] * wp.vec3(w[1], w[2], w[3])
+    speed = v[here, i] + dt * (force / mass[i] + gravity)
+    v[there, i] = speed
+    u[there, i] = u[here, i] + dt * speed
+
+
+@wp.kernel
+def tick(clock: wp.array(dtype=int), by: int):
+    clock[0] = clock[0] + by
+    clock[1] = clock[1] + by
+
+
+@wp.kernel
+def node_adjoint_before(
+    mass: wp.array(dtype=float),
+    dt: float,
+    u_bar: wp.array(dtype=wp.vec3),
+    v_bar: wp.array(dtype=wp.vec3),
+    f_bar: wp.array(dtype=wp.vec3),
+):
+    i = wp.tid()
+    total = v_bar[i] + dt * u_bar[i]
+    v_bar[i] = total
+    f_bar[i] = (dt / mass[i]) * total
+
+
+@wp.kernel
+def node_adjoint_after(
+    start: wp.array(dtype=int),
+    entry: wp.array(dtype=int),
+    link: wp.array2d(dtype=wp.vec4),
+    F_bar: wp.array(dtype=wp.mat33),
+    Fdot_bar: wp.array(dtype=wp.mat33),
+    x_bar: wp.array(dtype=wp.vec3),
+    xdot_bar: wp.array(dtype=wp.vec3),
+    u_bar: wp.array(dtype=wp.vec3),
+    v_bar: wp.array(dtype=wp.vec3),
+):
+    i = wp.tid()
+    du = wp.vec3()
+    dv = wp.vec3()
+    for e in range(start[i], start[i + 1]):
+        p = entry[e] / LINKS
+        w = link[p, entry[e] - p * LINKS]
+        g = wp.vec3(w[1], w[2], w[3])
+        du += F_bar[p] * g + w[0] * x_bar[p]
+        dv += Fdot_bar[p] * g + w[0] * xdot_bar[p]
+    u_bar[i] = u_bar[i] + du
+    v_bar[i] = v_bar[i] + dv
+
+
+@lru_cache(maxsize=None)
+def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
+    """`step`, `adjoint` and `look` over particles, compiled for these laws."""
+    terms = choose(names, "the laws of a simulation")
+    columns = sum(len(t.params) for t in terms.values())
+    Theta = wp.types.vector(columns, float)
+    total, read, work = fold(terms), gather(columns), power(terms)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def step(
+        clock: wp.array(dtype=int),
+        index: wp.array2d(dtype=int),
+        link: wp.array2d(dtype=wp.vec4),
+        volume: wp.array(dtype=float),
+        weight: wp.array(dtype=float),
+        theta: wp.array2d(dtype=float),
+        anchors: Anchors,
+        slots: int,
+        u: wp.array2d(dtype=wp.vec3),
+        v: wp.array2d(dtype=wp.vec3),
+        stress: wp.array(dtype=wp.mat33),
+        push: wp.array(dtype=wp.vec3),
+        trouble: wp.array(dtype=int),
+    ):
+        p = wp.tid()
+        slot = clock[0] % slots
+        F, Fdot = kinematics(u, v, index, link, slot, p)
+        J = wp.determinant(F)
+        # Written so that a NaN is trouble too.
+        if not (J > 0.0):
+            wp.atomic_min(trouble, 0, clock[1])
+            trouble[1] = p
+        inverse = wp.inverse(F)
+        L = Fdot * inverse
+        D = 0.5 * (L + wp.transpose(L))
+        stress[p] = (volume[p] * J) * total(F, D, read(theta, p)) * wp.transpose(inverse)
+        held = anchors.member[p]
+        force = wp.vec3()
+        if held > 0:
+            n = clock[1]
+            x = wp.vec3()
+            xdot = wp.vec3()
+            located = int(0)
+            for a in range(anchors.path.shape[0]):
+                if ((held >> a) & 1) == 1 and anchors.active[a, n] == 1:
+                    if located == 0:
+                        x = carried(u, index, link, slot, p)
+                        xdot = carried(v, index, link, slot, p)
+                        located = 1
+                    to = anchors.path[a, n]
+                    speed = (anchors.path[a, n + 1] - to) / anchors.step
+                    force += anchors.stiffness * (to - x) + anchors.damping * (speed - xdot)
+        push[p] = weight[p] * force
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def adjoint(
+        clock: wp.array(dtype=int),
+        index: wp.array2d(dtype=int),
+        link: wp.array2d(dtype=wp.vec4),
+        volume: wp.array(dtype=float),
+        weight: wp.array(dtype=float),
+        theta: wp.array2d(dtype=float),
+        anchors: Anchors,
+        slots: int,
+        u: wp.array2d(dtype=wp.vec3),
+        v: wp.array2d(dtype=wp.vec3),
+        f_bar: wp.array(dtype=wp.vec3),
+        F_bar: wp.array(dtype=wp.mat33),
+        Fdot_bar: wp.array(dtype=wp.mat33),
+        x_bar: wp.array(dtype=wp.vec3),
+        xdot_bar: wp.array(dtype=wp.vec3),
+        theta_bar: wp.array2d(dtype=float),
+    ):
+        p = wp.tid()
+        slot = clock[0] % slots
+        F, Fdot = kinematics(u, v, index, link, slot, p)
+        A = wp.mat33()
+        b = wp.vec3()
+        for k in range(27):
+            w = link[p, k]
+            f = f_bar[index[p, k]]
+            A -= wp.outer(f, wp.vec3(w[1], w[2], w[3]))
+            b += w[0] * f
+        mine = read(theta, p)
+        dF, dFdot, dtheta, _dA = wp.grad(work)(F, Fdot, mine, volume[p] * A)
+        F_bar[p] = dF
+        Fdot_bar[p] = dFdot
+        for m in range(wp.static(columns)):
+            theta_bar[p, m] = theta_bar[p, m] + dtheta[m]
+        held = anchors.member[p]
+        spring = float(0.0)
+        if held > 0:
+            for a in range(anchors.path.shape[0]):
+                if ((held >> a) & 1) == 1 and anchors.active[a, clock[1]] == 1:
+                    spring += weight[p]
+        x_bar[p] = (-anchors.stiffness * spring) * b
+        xdot_bar[p] = (-anchors.damping * spring) * b
+
+    return SimpleNamespace(step=step, adjoint=adjoint, columns=columns)

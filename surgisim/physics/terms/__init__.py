@@ -1,0 +1,1 @@
+"""One law per file; the file's name is the law's name everywhere."""
