@@ -1,0 +1,60 @@
+"""What the Gaussians are asked to be: like the picture, round, and moving with their neighbours.
+
+Wang, Yang, Zhao, Yang and Shen, Realistic surgical simulation from monocular videos, section 3.2 ("the paper").
+Every sum over Gaussians, groups or pixels is a mean here, so that a weight keeps its meaning when their number
+changes.
+"""
+
+import torch
+
+
+def masked_l1(value: torch.Tensor, target: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
+    """Mean of |value - target| where `mask` (H, W) is true (or weighted, 0-1); 0 when it is nowhere.
+
+    value, target: (H, W) or (H, W, C), in one unit, which is the result's too.
+    """
+    weight = mask.to(value.dtype)
+    channels = value[0, 0].numel()
+    total = (weight.reshape(*mask.shape, *[1] * (value.ndim - 2)) * (value - target).abs()).sum()
+    return total / (weight.sum() * channels) if bool(mask.any()) else total
+
+
+def anisotropic(scale: torch.Tensor, *, unit: float, r_m: float = 1.0, r_ani: float = 3.0) -> torch.Tensor:
+    """Keeps Gaussians from growing large or thin.
+
+        L_geo = mean_i ReLU(max(S_i) / unit - r_m) + ReLU(max(S_i) / min(S_i) - r_ani)
+
+    scale: radii [m], (G, 3). unit: the length that r_m is counted in [m]. The paper, equation of L_geo, whose
+    scenes have no unit (r_m = 1, r_ani = 3).
+    """
+    largest, smallest = scale.amax(1), scale.amin(1)
+    return (torch.relu(largest / unit - r_m) + torch.relu(largest / smallest - r_ani)).mean()
+
+
+def trajectory(step: torch.Tensor, groups: torch.Tensor, *, literal: bool = False) -> torch.Tensor:
+    """Keeps neighbours on parallel paths.
+
+        L_traj = mean_i mean_{j,k in N_i} |d_j - d_k|^2  =  mean_i 2/n sum_j |d_j - mean of d|^2
+        literal:  mean_i mean_{j,k in N_i} d_j . d_k     =  mean_i |mean of d|^2
+
+    step: motion of each Gaussian since the previous frame, d [m], (G, 3). groups: N_i, (M, n). The paper, equation
+    trajloss, is `literal`: minimised, it asks each group to stand still on average, which neighbours moving in
+    opposite directions satisfy. The default is 0 when they move alike.
+    """
+    moves = step[groups]
+    middle = moves.mean(1)
+    if literal:
+        return middle.square().sum(1).mean()
+    return 2 * (moves - middle[:, None]).square().sum(2).mean()
+
+
+def total_variation(value: torch.Tensor, neighbours: torch.Tensor) -> torch.Tensor:
+    """Keeps a quantity alike between neighbours, and free to jump where it must.
+
+        L_tv = mean_i mean_{j in N_i} |v_i - v_j|
+
+    value: (G,) or (G, C), |.| summed over C. neighbours: (G, k). Rudin, Osher and Fatemi, Nonlinear total
+    variation based noise removal algorithms, Physica D 60 (1992), on a graph.
+    """
+    value = value.reshape(len(value), -1)
+    return (value[:, None] - value[neighbours]).abs().sum(2).mean()
