@@ -1,0 +1,39 @@
+# make demo              set up once, run the whole graph on the embedded clip, say where the report is
+# make demo VIDEO=clip.mp4 [OUT=folder]    the same on your own clip
+# make test, make lint   what CI runs
+# make config            rewrite config/config.yaml and config/schemas/ from the settings models
+# make lock              choose the newest fitting versions anew and write requirements.txt
+
+BIN := .venv/bin
+OUT ?= .
+ARGS ?=
+
+.PHONY: demo test lint config lock setup clean
+.DEFAULT_GOAL := demo
+
+setup:
+	@bash envs/setup.sh
+
+demo: setup
+	@$(BIN)/surgisim $(if $(VIDEO),run "$(VIDEO)",demo) --out "$(OUT)" $(ARGS)
+
+test: setup
+	@$(BIN)/python -m pytest $(ARGS)
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/snakefmt --check workflow
+	$(BIN)/snakemake --snakefile workflow/Snakefile --lint
+
+config: setup
+	$(BIN)/python -m surgisim.config.whole config
+
+lock: setup
+	$(BIN)/python -m pip install -q uv
+	$(BIN)/python -m uv pip compile pyproject.toml --universal --python-version 3.11 --extra develop --extra learned \
+	  --generate-hashes --no-emit-index-url --no-emit-find-links --excludes envs/excluded.txt --no-emit-package torch \
+	  --custom-compile-command "make lock" --upgrade --output-file requirements.txt
+
+clean:
+	rm -rf results logs benchmarks .snakemake

@@ -1,0 +1,90 @@
+"""What the rules share: which clips and variants, where an output lies, which settings and code a stage has."""
+
+import functools
+import sys
+from pathlib import Path
+
+ROOT = Path(workflow.basedir).parent
+sys.path.insert(0, str(ROOT))
+
+from surgisim.digest import digest
+from surgisim.plan import plan
+from surgisim.problem import Problem
+
+try:
+    PLAN = plan(
+        {
+            key: value
+            for key, value in config.items()
+            if key not in ("clips", "variants")
+        },
+        clips=Path(config.get("clips", ROOT / "config" / "clips.tsv")),
+        variants=Path(config.get("variants", ROOT / "config" / "variants.yaml")),
+    )
+except Problem as problem:
+    raise WorkflowError(str(problem)) from None
+
+
+# Every variant, not only those that run: one that is not listed would turn shared files into "missing sources".
+wildcard_constraints:
+    clip="|".join(PLAN.clips),
+    variant="|".join(PLAN.variants),
+
+
+# Snakemake passes a job's threads on as OMP_NUM_THREADS only; and a stage must run with this checkout's library.
+shell.prefix(
+    "set -euo pipefail; export NUMBA_NUM_THREADS=$OMP_NUM_THREADS MPLBACKEND=Agg PYTHONHASHSEED=0"
+    f" SURGISIM='{ROOT}' PYTHONPATH='{ROOT}' PATH='{Path(sys.executable).parent}':$PATH; "
+)
+
+
+# The nine stages whose time and memory the tables show.
+MEASURED = (
+    "ingest",
+    "masking",
+    "inpainting",
+    "depth",
+    "tracking",
+    "reconstruction",
+    "thickening",
+    "estimation",
+    "simulation",
+)
+
+
+def upstream(stage, name):
+    """Input function: where `stage` left `name` for this job's clip and variant."""
+    return (
+        lambda w: f"results/{w.clip}/{PLAN.homes[stage, w.clip, w.variant]}/{stage}/{name}"
+    )
+
+
+def settings(stage):
+    """Params function: the slice of the settings this stage may read, and nothing else."""
+    return lambda w: PLAN.slices[stage, w.clip, w.variant]
+
+
+@functools.cache
+def _code(stage):
+    return digest(ROOT / "stages" / f"{stage}.py", ROOT)
+
+
+def code(stage):
+    """Params function: a digest of all code the stage imports, which Snakemake itself does not see."""
+    return lambda w: _code(stage)
+
+
+def recording(w):
+    """The user's recording, or the embedded one."""
+    return PLAN.clips[w.clip].path or upstream("phantom", "clip.mp4")(w)
+
+
+def truth(w):
+    """What is true of the embedded clip; nothing for a recording."""
+    return [] if PLAN.clips[w.clip].path else upstream("phantom", "truth.npz")(w)
+
+
+def benchmarks(w):
+    """Where the stages of this clip and variant, some of them shared, left their time and memory."""
+    homes = ((stage, PLAN.homes[stage, w.clip, w.variant]) for stage in MEASURED)
+    return ":".join(f"benchmarks/{w.clip}/{home}/{stage}.tsv" for stage, home in homes)

@@ -1,0 +1,96 @@
+"""What the run achieved, in numbers and on one page."""
+
+
+rule evaluation:
+    input:
+        frames=upstream("ingest", "frames.npz"),
+        camera=upstream("ingest", "camera.json"),
+        given=upstream("ingest", "given.npz"),
+        masks=upstream("masking", "masks.npz"),
+        inpainted=upstream("inpainting", "inpainted.npz"),
+        depth=upstream("depth", "depth.npz"),
+        tracks=upstream("tracking", "tracks.npz"),
+        motion=upstream("tracking", "motion.npz"),
+        scene=upstream("reconstruction", "scene.ply"),
+        rendered=upstream("reconstruction", "rendered.npz"),
+        body=upstream("thickening", "body.npz"),
+        physics=upstream("estimation", "physics.json"),
+        fit=upstream("estimation", "fit.json"),
+        replay=upstream("simulation", "replay.npz"),
+        truth=truth,
+    output:
+        metrics=report(
+            "results/{clip}/{variant}/evaluation/metrics.json",
+            caption="../report/metrics.rst",
+            category="{clip}",
+            labels={"variant": "{variant}", "what": "numbers"},
+        ),
+    log:
+        "logs/{clip}/{variant}/evaluation.log",
+    benchmark:
+        "benchmarks/{clip}/{variant}/evaluation.tsv"
+    conda:
+        "../../envs/report.yaml"
+    resources:
+        mem_mb=3000,
+    params:
+        truth=lambda w, input: f"--truth {input.truth}" if input.truth else "",
+        benchmarks=benchmarks,
+        settings=settings("evaluation"),
+        code=code("evaluation"),
+    shell:
+        'python "$SURGISIM/stages/evaluation.py"'
+        " --frames {input.frames} --camera {input.camera} --given {input.given} --masks {input.masks}"
+        " --inpainted {input.inpainted} --depth {input.depth} --tracks {input.tracks}"
+        " --motion {input.motion} --scene {input.scene} --rendered {input.rendered}"
+        " --body {input.body} --physics {input.physics} --fit {input.fit} --replay {input.replay}"
+        " {params.truth} --benchmarks {params.benchmarks} --metrics {output.metrics}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
+rule report:
+    input:
+        metrics="results/{clip}/{variant}/evaluation/metrics.json",
+    output:
+        page="results/{clip}/{variant}/report/report.html",
+    log:
+        "logs/{clip}/{variant}/report.log",
+    benchmark:
+        "benchmarks/{clip}/{variant}/report.tsv"
+    conda:
+        "../../envs/report.yaml"
+    resources:
+        mem_mb=3000,
+    params:
+        settings=settings("report"),
+        code=code("report"),
+    shell:
+        'python "$SURGISIM/stages/report.py"'
+        " --metrics {input.metrics} --report {output.page}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
+rule summary:
+    input:
+        metrics=expand(
+            "results/{clip}/{variant}/evaluation/metrics.json",
+            clip=PLAN.clips,
+            variant=PLAN.run,
+        ),
+    output:
+        table="results/summary.json",
+        page="results/summary.html",
+    log:
+        "logs/summary.log",
+    benchmark:
+        "benchmarks/summary.tsv"
+    conda:
+        "../../envs/report.yaml"
+    resources:
+        mem_mb=2000,
+    params:
+        code=lambda w: _code("summary"),
+    shell:
+        'python "$SURGISIM/stages/summary.py"'
+        " --metrics {input.metrics}"
+        " --table {output.table} --page {output.page} --code {params.code} > {log} 2>&1"
