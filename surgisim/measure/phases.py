@@ -1,0 +1,28 @@
+"""When the tissue rests, is loaded, held and let go."""
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from surgisim.artifacts.motion import Motion
+
+Phase = Literal["rest", "load", "hold", "released"]
+PHASES: tuple[str, ...] = get_args(Phase)
+
+
+def phases(motion: Motion, *, still: float = 0.05) -> np.ndarray:
+    """Phase of each frame, (T,) str.
+
+    A frame loads when a holding grip moves faster than `still` times its fastest; a hold is any
+    other frame with a grip; without a grip it is rest before the first and released after it.
+    """
+    j, count = motion.active.shape
+    held = motion.active.any(0)
+    loading = np.zeros(count, bool)
+    for i in range(j):
+        speed = np.zeros(count)
+        speed[1:] = np.linalg.norm(np.diff(motion.position[i], axis=0), axis=-1)
+        speed[~motion.active[i]] = 0
+        loading |= speed > still * max(speed.max(initial=0), 1e-12)
+    after = np.cumsum(held) > 0
+    return np.select([loading & held, held, after], ["load", "hold", "released"], "rest")
