@@ -6,14 +6,14 @@
 
 b_p holds anchored particles (a grip, the base) to their path by a spring and a damper per unit of
 mass, so that the constraint acts on the interpolated motion of the driven volume itself and not on
-whole nodes, which would widen it by up to a cell. Both passes only gather: every node sums over its own links in a fixed order,
-so results do not depend on the number of threads.
+whole nodes, which would widen it by up to a cell. Both passes only gather: every node sums over its
+own links in a fixed order, so results do not depend on the number of threads.
 
 State lives in a ring of slots, (L, N): slot n % L is read and slot (n + 1) % L written, which
 serves a plain run (L = 2) and a recorded segment (L = steps + 1) alike.
 """
 
-from functools import lru_cache
+from functools import cache
 from types import SimpleNamespace
 
 import warp as wp
@@ -144,12 +144,11 @@ def node_adjoint_after(
     v_bar[i] = v_bar[i] + dv
 
 
-@lru_cache(maxsize=None)
+@cache
 def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
     """`step`, `adjoint` and `look` over particles, compiled for these laws."""
     terms = choose(names, "the laws of a simulation")
     columns = sum(len(t.params) for t in terms.values())
-    Theta = wp.types.vector(columns, float)
     total, read, work = fold(terms), gather(columns), power(terms)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -186,7 +185,7 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
             n = clock[1]
             x = wp.vec3()
             xdot = wp.vec3()
-            located = int(0)
+            located = 0
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.active[a, n] == 1:
                     if located == 0:
@@ -234,7 +233,7 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
         for m in range(wp.static(columns)):
             theta_bar[p, m] = theta_bar[p, m] + dtheta[m]
         held = anchors.member[p]
-        spring = float(0.0)
+        spring = 0.0
         if held > 0:
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.active[a, clock[1]] == 1:

@@ -26,6 +26,10 @@ ANCHOR_DAMPING = 0.3
 NEVER = 2**31 - 1
 
 
+class Breakdown(Problem):
+    """A run that cannot go on: inverted tissue or a number that is none, with step and place."""
+
+
 @dataclass(frozen=True)
 class Run:
     """What a forward run leaves: enough to draw it, to judge it and to walk it back."""
@@ -51,7 +55,7 @@ class Simulator:
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         device: str = "cpu",
     ) -> None:
-        """rest particles [m], (P, 3); volume [m^3], (P,); density [kg/m^3]; wave_speed [m/s] sets the anchors' spring."""
+        """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,); `wave_speed` [m/s] sets the anchors' spring."""
         self.rest, self.grid, self.terms, self.device = np.asarray(rest, float), grid, tuple(terms), device
         self.count = len(rest)
         nodes, weight, gradient = grid.stencil(rest)
@@ -124,9 +128,7 @@ class Simulator:
 
     # Backward
 
-    def gradient(
-        self, theta: np.ndarray, drive: Drive, run: Run, u_bar: np.ndarray, *, first: int = 0
-    ) -> np.ndarray:
+    def gradient(self, theta: np.ndarray, drive: Drive, run: Run, u_bar: np.ndarray, *, first: int = 0) -> np.ndarray:
         """Derivative of a loss with respect to theta, (P, M), given its derivative `u_bar` (T, A, 3) by `run.u`."""
         anchors, theta_d = self._anchors(drive), self._theta(theta)
         per = drive.per_frame
@@ -194,9 +196,7 @@ class Simulator:
         nodes = [self.clock, self.start, self.entry, self.link, self.stress, self.push, self.mass, self.gravity]
         return [
             self._particles(self.kernels.step, theta, anchors, slots, u, v, [self.stress, self.push, self.trouble]),
-            wp.launch(
-                node_step, len(self.place), [*nodes, dt, slots, u, v], device=self.device, record_cmd=True
-            ),
+            wp.launch(node_step, len(self.place), [*nodes, dt, slots, u, v], device=self.device, record_cmd=True),
             wp.launch(tick, 1, [self.clock, 1], device=self.device, record_cmd=True),
         ]
 
@@ -225,12 +225,12 @@ class Simulator:
         step, particle = self.trouble.numpy()
         if step != NEVER:
             where = np.round(self.rest[particle], 4).tolist()
-            raise Problem(
+            raise Breakdown(
                 f"simulation: particle {particle} at rest position {where} m turned inside out (or stopped being a "
                 f"number) at step {step} ({step * drive.step:.4f} s). Its load is too violent for this tissue or the "
                 "step too large: take a smaller step, a gentler motion, or a stiffer tissue."
             )
         if not np.isfinite(u).all():
-            raise Problem(
+            raise Breakdown(
                 f"simulation: a displacement is not finite between frames {frame} and {frame + 1}. Take a smaller step."
             )

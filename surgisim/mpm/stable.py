@@ -12,9 +12,7 @@ def wave_speed(terms: dict[str, Term], values: dict[str, dict[str, float]], dens
     return math.sqrt(modulus / density)
 
 
-def largest_step(
-    terms: dict[str, Term], values: dict[str, dict[str, float]], density: float, spacing: float
-) -> float:
+def largest_step(terms: dict[str, Term], values: dict[str, dict[str, float]], density: float, spacing: float) -> float:
     """Largest stable step [s]: 1 / (2 c / dx + 2 eta / (rho dx^2)).
 
     The wave speed alone is not enough once viscosity grows; the bound was found stable over E/rho

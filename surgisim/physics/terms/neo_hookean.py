@@ -21,8 +21,8 @@ def stress(F: wp.mat33, D: wp.mat33, theta: Theta):
     mu = theta[0] / (2.0 * (1.0 + theta[1]))
     lam = theta[0] * theta[1] / ((1.0 + theta[1]) * (1.0 - 2.0 * theta[1]))
     J = wp.determinant(F)
-    I = wp.identity(n=3, dtype=float)
-    return (mu * (F * wp.transpose(F) - I) + lam * wp.log(J) * I) / J
+    one = wp.identity(n=3, dtype=float)
+    return (mu * (F * wp.transpose(F) - one) + lam * wp.log(J) * one) / J
 
 
 def twin(F, D, E, nu):

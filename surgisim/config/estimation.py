@@ -1,0 +1,42 @@
+"""Settings of the estimation of physical parameters."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from surgisim.config.base import Settings
+
+
+class Estimation(Settings):
+    """What is fitted, to what, and for how long."""
+
+    enabled: bool = True
+    """Whether to fit at all; without it every law keeps its default or `start` value [-]."""
+    terms: list[str] = ["corotated", "newtonian"]
+    """Laws of the body, by their file names in surgisim/physics/terms [-]."""
+    start: dict[str, dict[str, float]] = {}
+    """Law -> parameter -> value a fit starts from, instead of the law's default [the parameter's unit]."""
+    fixed: list[str] = []
+    """'law.parameter' entries that keep their start value [-]."""
+    density: float = Field(1050.0, gt=0)
+    """Mass density of the tissue [kg/m^3]."""
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Acceleration in the camera frame; zero where frame 0 is in equilibrium under it [m/s^2]."""
+    iterations: int = Field(6, ge=1, le=50)
+    """Most Gauss-Newton iterations a round [-]."""
+    first_window: float = Field(0.5, gt=0, le=1)
+    """Share of the fitted frames that the first round sees; each further round sees twice as many [-]."""
+    field: list[str] = ["corotated.E", "newtonian.eta"]
+    """'law.parameter' entries refined per particle, where that pays on frames kept from the refinement [-]."""
+    field_iterations: int = Field(6, ge=0, le=200)
+    """Adjoint iterations of the per-particle refinement; 0 leaves parameters uniform [-]."""
+    smoothness: float = Field(3.0, ge=0)
+    """Weight of the total variation of per-particle parameters, against the data's misfit [-]."""
+    image_weight: float = Field(0.5, ge=0)
+    """Weight of the rendered image's L1 misfit beside the tracks' in the per-particle refinement [-]."""
+    image_frames: int = Field(8, ge=0)
+    """Frames rendered in each iteration of the refinement [-]."""
+    device: Literal["cpu", "cuda"] = "cpu"
+    """Where the simulation runs [-]."""
+    seed: int = 0
+    """Seed of the choice of rendered frames [-]."""

@@ -1,0 +1,92 @@
+"""What a clip can tell: intervals of parameters and of dimensionless groups, and who informs them."""
+
+import numpy as np
+
+from surgisim.estimation.gauss_newton import Solution
+from surgisim.estimation.search import Search
+
+TOLD = 0.5
+"""A number counts as told by the clip when its posterior spread is at most this share of the prior's."""
+
+
+def identifiability(
+    solution: Solution,
+    search: Search,
+    *,
+    phase_of: np.ndarray,
+    phase_names: tuple[str, ...],
+    density: float,
+    length: float,
+    independent: float,
+) -> dict:
+    """Parameters and groups with 90 % intervals, the share of information from each phase, and whether told.
+
+    phase_of: phase of every residual, (R,). length: thickness of the body [m].
+    independent: share of the residuals that count as independent, because tracking noise is
+    correlated along a track and between neighbours; the misfit's own size scales the noise.
+    """
+    J, r, spread = solution.jacobian, solution.residual, search.spread
+    used = r != 0
+    scale = max(1.0, float(np.mean(r[used] ** 2))) if used.any() else 1.0
+    information = independent / scale * (J.T @ J)
+    covariance = np.linalg.inv(information + np.diag(1 / spread**2))
+    result = {}
+    for name, direction, value, unit, logarithmic in _quantities(search, solution.x, density, length):
+        sd = float(np.sqrt(direction @ covariance @ direction))
+        prior = float(np.sqrt(((direction * spread) ** 2).sum()))
+        by_phase = {n: float(((J[phase_of == k] @ direction) ** 2).sum()) for k, n in enumerate(phase_names)}
+        total = sum(by_phase.values())
+        low, high = (
+            (value * np.exp(-1.645 * sd), value * np.exp(1.645 * sd))
+            if logarithmic
+            else (
+                value - 1.645 * sd,
+                value + 1.645 * sd,
+            )
+        )
+        told = sd <= TOLD * prior
+        result[name] = {
+            "value": float(value),
+            "low": float(low),
+            "high": float(high),
+            "unit": unit,
+            "told": bool(told),
+            "phases": {n: round(v / total, 3) if total > 0 else 0.0 for n, v in by_phase.items()},
+        }
+    return result
+
+
+def _quantities(search: Search, x: np.ndarray, density: float, length: float):
+    """Name, gradient in search space, value, unit, whether logarithmic."""
+    values = search.values(x)
+    place = {name: k for k, name in enumerate(search.names)}
+    for k, (law, param, p) in enumerate(search.free):
+        yield f"{law}.{param}", np.eye(len(x))[k], values[law][param], p.unit, p.logarithmic
+    moduli = [n for n in search.names if n.endswith(".E")]
+    viscosities = [n for n in search.names if n.endswith(".eta")]
+    for m in moduli:
+        E = values[m.split(".")[0]]["E"]
+        for v in viscosities:
+            eta = values[v.split(".")[0]]["eta"]
+            yield f"{v} / {m}", np.eye(len(x))[place[v]] - np.eye(len(x))[place[m]], eta / E, "s", True
+        yield f"{m} / (density length^2)", np.eye(len(x))[place[m]], E / (density * length**2), "1/s^2", True
+
+
+def in_words(table: dict, steps: int, before: float, after: float) -> str:
+    """The outcome of a fit for a person."""
+    told = [n for n, q in table.items() if q["told"]]
+    untold = [n for n, q in table.items() if not q["told"]]
+    parts = [
+        f"On frames that were never fitted, the median distance between simulated and tracked points is "
+        f"{after * 1e3:.3f} mm ({before * 1e3:.3f} mm with default parameters), with {steps} steps a frame."
+    ]
+    if told:
+        parts.append("The clip tells " + ", ".join(_quoted(n, table[n]) for n in told) + ".")
+    if untold:
+        parts.append("It cannot tell " + ", ".join(untold) + ": those stay near where the fit began.")
+    return " ".join(parts)
+
+
+def _quoted(name: str, q: dict) -> str:
+    unit = "" if q["unit"] == "1" else f" {q['unit']}"
+    return f"{name} = {q['value']:.3g}{unit} ({q['low']:.3g} to {q['high']:.3g})"

@@ -1,0 +1,85 @@
+"""What a simulation is compared with: tracked points of the surface, weighted by their noise."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from surgisim.artifacts.frames import USED
+from surgisim.artifacts.motion import Motion
+from surgisim.artifacts.tracks import Tracks
+from surgisim.mpm.simulator import Simulator
+from surgisim.problem import Problem
+
+PHASES = ("rest", "load", "hold", "release")
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Displacements of K surface points, camera frame."""
+
+    rest: np.ndarray
+    """Their positions in frame 0 [m], (K, 3)."""
+    displacement: np.ndarray
+    """Since frame 0 [m], (K, T, 3), zero where not seen."""
+    weight: np.ndarray
+    """1 / standard deviation of each component [1/m], (K, T, 3), zero where not seen or not to be used."""
+    carry: sparse.csr_matrix
+    """Active nodes to points, (K, A)."""
+
+    def residual(self, u: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """Weighted difference, simulated minus seen, at `frames`, (K, len(frames), 3); u is (T, A, 3)."""
+        simulated = np.stack([self.carry @ u[t].astype(float) for t in frames], 1)
+        return self.weight[:, frames] * (simulated - self.displacement[:, frames])
+
+    def error(self, u: np.ndarray, frames: np.ndarray) -> float:
+        """Median distance between simulated and seen points at `frames` [m]; NaN if none is seen."""
+        simulated = np.stack([self.carry @ u[t].astype(float) for t in frames], 1)
+        seen = self.weight[:, frames].any(-1)
+        distance = np.linalg.norm(simulated - self.displacement[:, frames], axis=-1)[seen]
+        return float(np.median(distance)) if len(distance) else float("nan")
+
+
+def observe(tracks: Tracks, motion: Motion, simulator: Simulator, *, floor: float) -> Observation:
+    """Points that the body can carry and that are not themselves driven.
+
+    floor: least standard deviation of a component [m]: no tracker is exact, and the body's own
+    discretisation is not either. Raises Problem when fewer than 10 points remain.
+    """
+    rest = tracks.xyz[:, 0].astype(float)
+    usable = np.isfinite(rest).all(1) & tracks.visible[:, 0]
+    carry = simulator.grid.matrix(np.where(usable[:, None], rest, simulator.rest[0]))[:, simulator.place]
+    support = np.asarray(carry.sum(1)).ravel()
+    usable &= support > 0.5
+    for j in range(len(motion.radius)):
+        usable &= np.linalg.norm(rest - motion.center_rest[j], axis=1) > motion.radius[j]
+    if usable.sum() < 10:
+        raise Problem(
+            f"tracks: only {int(usable.sum())} points lie on the body and outside the grip, but 10 are needed to fit "
+            "its physics. Use a longer focal, a larger working size, or estimation.enabled: false."
+        )
+    carry = sparse.diags(1 / np.maximum(support, 1e-9))[usable] @ carry
+    moved = (tracks.xyz - tracks.xyz[:, :1])[usable].astype(float)
+    seen = tracks.visible[usable] & np.isfinite(moved).all(-1)
+    across, along = np.moveaxis(tracks.sigma_xyz[usable].astype(float), -1, 0)
+    sigma = np.sqrt(np.stack([across, across, along], -1) ** 2 + floor**2)
+    weight = np.where(seen[..., None], 1 / sigma, 0.0)
+    return Observation(rest[usable], np.where(seen[..., None], moved, 0.0), weight, carry.tocsr())
+
+
+def phases(motion: Motion, frames: int) -> np.ndarray:
+    """Index into PHASES of every frame, (T,): before any grip, carried, held still, after the release."""
+    phase = np.zeros(frames, int)
+    held = motion.active.any(0) if len(motion.active) else np.zeros(frames, bool)
+    begun = np.maximum.accumulate(held)
+    phase[begun & ~held] = PHASES.index("release")
+    if held.any():
+        speed = np.linalg.norm(np.gradient(motion.position, axis=1), axis=-1).max(0)
+        quick = speed > 0.15 * speed[held].max()
+        phase[held] = np.where(quick[held], PHASES.index("load"), PHASES.index("hold"))
+    return phase
+
+
+def fitted_frames(split: np.ndarray) -> np.ndarray:
+    """Frames that estimation may look at, without frame 0, which is the reference."""
+    return np.flatnonzero(split == USED)[np.flatnonzero(split == USED) > 0]

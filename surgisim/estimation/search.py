@@ -1,0 +1,79 @@
+"""The few numbers a fit searches, and their way into a simulation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from surgisim.mpm.setup import Values
+from surgisim.physics.catalogue import Param, choose
+from surgisim.problem import Problem
+
+PRIOR_LOG = 1.5
+"""Standard deviation of the prior on a logarithm: tissue moduli spread over a factor 4-5 either way."""
+PRIOR_SHARE = 0.3
+"""The same for a plain parameter, as a share of its range."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """A point x in search space: logarithms of moduli, plain ratios."""
+
+    terms: tuple[str, ...]
+    free: tuple[tuple[str, str, Param], ...]
+    """Law, parameter and its description, in the order of x."""
+    base: Values
+    """Every parameter's start value."""
+
+    @property
+    def names(self) -> list[str]:
+        return [f"{law}.{param}" for law, param, _ in self.free]
+
+    @property
+    def start(self) -> np.ndarray:
+        return np.array([_forward(p, self.base[law][name]) for law, name, p in self.free])
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Prior standard deviation of each component of x."""
+        return np.array([PRIOR_LOG if p.logarithmic else PRIOR_SHARE * (p.high - p.low) for *_, p in self.free])
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        ends = [(_forward(p, p.low), _forward(p, p.high)) for *_, p in self.free]
+        low, high = np.array(ends).reshape(-1, 2).T
+        return low, high
+
+    def values(self, x: np.ndarray) -> Values:
+        """Law -> parameter -> value at x."""
+        result = {law: dict(params) for law, params in self.base.items()}
+        for (law, name, p), value in zip(self.free, x, strict=True):
+            result[law][name] = float(np.exp(value) if p.logarithmic else value)
+        return result
+
+
+def search(terms: list[str], start: Values, fixed: list[str]) -> Search:
+    """Everything the laws have, less what is fixed; refuses names that do not exist and values out of range."""
+    chosen = choose(terms)
+    known = {f"{law}.{p}" for law, t in chosen.items() for p in t.params}
+    for name in [*fixed, *(f"{law}.{p}" for law, ps in start.items() for p in ps)]:
+        if name not in known:
+            raise Problem(f"estimation: '{name}' is no parameter of the chosen laws, which have {sorted(known)}.")
+    base, free = {}, []
+    for law, term in chosen.items():
+        base[law] = {}
+        for name, p in term.params.items():
+            value = start.get(law, {}).get(name, p.default)
+            if not (p.low <= value <= p.high or value == p.off):
+                raise Problem(
+                    f"estimation: start value {value} of '{law}.{name}' is outside {p.low:g} to {p.high:g} {p.unit}. "
+                    "Choose one inside."
+                )
+            base[law][name] = float(value)
+            # A logarithm cannot leave an off value of zero: a law that starts silent stays so.
+            if f"{law}.{name}" not in fixed and not (p.logarithmic and value <= 0):
+                free.append((law, name, p))
+    return Search(tuple(terms), tuple(free), base)
+
+
+def _forward(p: Param, value: float) -> float:
+    return float(np.log(value) if p.logarithmic else value)
