@@ -1,0 +1,33 @@
+"""Give the canonical scene the depth that a simulation needs.
+
+reads   scene.ply, camera.json
+writes  body.npz   particles of tissue in frame 0, camera frame [m]
+        body.ply   the same as coloured points
+"""
+
+from surgisim.artifacts.body import Body
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.scene import Scene
+from surgisim.config.thickening import Thickening
+from surgisim.stage import Bytes, stage
+
+
+@stage(
+    reads={"scene": Scene, "camera": Camera},
+    writes={"body": Body, "points": Bytes(".ply")},
+    settings=Thickening,
+)
+def main(scene, camera, *, settings, progress):
+    from surgisim.gaussians.attributes import drawn
+    from surgisim.gaussians.rasterise import render
+    from surgisim.gaussians.surface import surface_from
+    from surgisim.thickening import points, thicken
+
+    image = render(*drawn(scene), camera)
+    surface = surface_from(image, least_cover=settings.least_cover, smooth=settings.smooth)
+    body = thicken(surface, camera, settings, centers=scene.mean, progress=progress)
+    return body, points(body)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,78 @@
+"""Settings of the canonical scene and its deformation field."""
+
+from pydantic import Field
+
+from surgisim.config.base import Settings
+
+
+class Reconstruction(Settings):
+    iterations: int = Field(5000, ge=10)
+    """Optimisation steps, one frame each [1]."""
+    phases: tuple[float, float, float] = (0.5, 0.7, 0.9)
+    """Ends of the coarse phase, of the trajectory phase and of the field's refinement; from the last on the field is
+    frozen and the canonical scene refined [fraction of iterations]."""
+    seed: int = 0
+    """Seed of the frames' order and of the head's first weights [1]."""
+    threads: int = Field(2, ge=1)
+    """Threads of the linear algebra; the result depends on it in the last digits [1]."""
+
+    gaussians: int = Field(10000, ge=50)
+    """Gaussians to start from, as far as the image has pixels for them [1]."""
+    most_gaussians: int = Field(14000, ge=50)
+    """Never more than this [1]."""
+
+    channels: int = Field(16, ge=1)
+    """Features in each plane [1]."""
+    knots: tuple[int, ...] = (16, 48)
+    """Knots along the longest side of the box, one number a scale [1]."""
+    knots_in_depth: tuple[int, ...] = (6, 12)
+    """Knots along z, one number a scale [1]."""
+    knots_in_time: tuple[float, ...] = (0.2, 0.6)
+    """Knots along t, one number a scale [1/frame]."""
+    head_width: int = Field(48, ge=1)
+    """Neurons in each of the head's two hidden layers [1]."""
+
+    trajectory: float = Field(1.0, ge=0)
+    """Weight of the trajectory term, 0 switches it off [1]."""
+    trajectory_form: str = Field("default", pattern="^(default|literal)$")
+    """'default' asks neighbours for equal motion, 'literal' is the paper's printed sum of dot products [-]."""
+    neighbours: int = Field(5, ge=1)
+    """Neighbours of each Gaussian in the trajectory term [1]."""
+    anisotropy: float = Field(1.0, ge=0)
+    """Weight of the anisotropic term, 0 switches it off [1]."""
+    anisotropy_largest: float = Field(1.0, gt=0)
+    """r_m, largest radius [anisotropy_unit]."""
+    anisotropy_unit: float = Field(4.0, gt=0)
+    """Length r_m is counted in; the paper's scenes have no unit [median first radius]."""
+    anisotropy_ratio: float = Field(3.0, ge=1)
+    """r_ani, largest over smallest radius [1]."""
+    depth: float = Field(0.5, ge=0)
+    """Weight of the depth misfit [1/median depth]."""
+    smoothness_space: float = Field(0.01, ge=0)
+    """Weight of the planes' squared differences in space [1]."""
+    smoothness_time: float = Field(0.01, ge=0)
+    """Weight of the time planes' squared second differences [1]."""
+
+    weight_copied: float = Field(0.3, ge=0, le=1)
+    """Weight of a pixel whose colour was copied from another frame; seen tissue weighs 1 [1]."""
+    weight_invented: float = Field(0.03, ge=0, le=1)
+    """Weight of a pixel whose colour was invented [1]."""
+    weight_specular: float = Field(0.3, ge=0, le=1)
+    """Weight of a highlight [1]."""
+
+    rate_mean: float = Field(2e-4, gt=0)
+    """Step size of the centres [half longest side of the box]."""
+    rate_color: float = Field(5e-3, gt=0)
+    """Step size of the colours [1]."""
+    rate_opacity: float = Field(2e-2, gt=0)
+    """Step size of the opacities' logits [1]."""
+    rate_scale: float = Field(5e-3, gt=0)
+    """Step size of the radii's logarithms [1]."""
+    rate_rotation: float = Field(2e-3, gt=0)
+    """Step size of the quaternions [1]."""
+    rate_planes: float = Field(5e-3, gt=0)
+    """Step size of the feature planes [1]."""
+    rate_head: float = Field(1e-3, gt=0)
+    """Step size of the head's weights [1]."""
+    rate_end: float = Field(0.1, gt=0, le=1)
+    """All step sizes fall exponentially to this share of their start by the end [1]."""

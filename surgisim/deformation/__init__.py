@@ -1,0 +1,1 @@
+"""The field that moves the canonical Gaussians: feature planes and a small head."""

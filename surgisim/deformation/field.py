@@ -1,0 +1,133 @@
+"""Feature planes and head together: how far every Gaussian has moved at any time.
+
+    (dmu, do, dR, dS) = head(features(mu, t))
+
+mu in the space-time box; dmu in units of the box's half longest side; do added to the opacity's logit, dR to the
+quaternion before it is made a unit again, dS to the logarithm of the radii, as in 4D Gaussian Splatting. The paper
+adds dS without saying in which scale; the logarithm keeps radii positive.
+"""
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from surgisim.artifacts.deformation import Deformation
+from surgisim.artifacts.scene import Scene
+from surgisim.deformation.planes import Layout, features
+from surgisim.problem import Problem
+
+OUTPUTS = (3, 1, 4, 3)
+"""Numbers of dmu, do, dR, dS."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """A deformation field, ready to be evaluated or trained."""
+
+    layout: Layout
+    low: np.ndarray
+    """Lower corner of the space-time box: x, y, z [m], t [s], (4,)."""
+    high: np.ndarray
+    """Upper corner, (4,)."""
+    planes: torch.Tensor
+    """All planes end to end."""
+    head: tuple[torch.Tensor, ...]
+    """Weight matrices, each (out, in), without biases."""
+
+    def __call__(self, mean: torch.Tensor, time: float) -> tuple[torch.Tensor, ...]:
+        """dmu [m] (G, 3), do (G,), dR (G, 4), dS (G, 3) of Gaussians resting at `mean` [m], (G, 3), at `time` [s]."""
+        x = features(self.planes, self.inside(mean), self.clock(time), self.layout)
+        for weight in self.head[:-1]:
+            x = torch.relu(torch.nn.functional.linear(x, weight))
+        moved, opacity, turn, grow = torch.nn.functional.linear(x, self.head[-1]).split(OUTPUTS, 1)
+        return moved * self.reach, opacity[:, 0], turn, grow
+
+    def inside(self, mean: torch.Tensor) -> torch.Tensor:
+        """Positions in the box, 0-1."""
+        low, high = (torch.as_tensor(a[:3], dtype=mean.dtype) for a in (self.low, self.high))
+        return (mean - low) / (high - low)
+
+    def clock(self, time: float) -> float:
+        """Time in the box, 0-1."""
+        return float((time - self.low[3]) / (self.high[3] - self.low[3]))
+
+    @property
+    def reach(self) -> float:
+        """Half the longest side of the box [m]."""
+        return float(np.max(self.high[:3] - self.low[:3]) / 2)
+
+
+def still_field(
+    low: np.ndarray, high: np.ndarray, sizes: np.ndarray, channels: int, width: int, rng: np.random.Generator
+) -> Field:
+    """A field that moves nothing yet: every plane is 1 and the head is random.
+
+    low, high: the box (x, y, z [m], t [s]); sizes: knots along x, y, z, t at each scale, (L, 4); width: of the head's
+    two hidden layers.
+    """
+    layout = Layout(np.asarray(sizes, np.int64), channels)
+    widths = [layout.features, width, width, sum(OUTPUTS)]
+    head = tuple(
+        torch.tensor(rng.standard_normal((n, m)) * np.sqrt(1.0 / m), dtype=torch.float32)
+        for m, n in zip(widths, widths[1:], strict=False)
+    )
+    return Field(layout, np.asarray(low, float), np.asarray(high, float), torch.ones(layout.count), head)
+
+
+def save_field(field: Field, history: np.ndarray) -> Deformation:
+    """The field as an artifact; history: one row a report (R, 5)."""
+    layout = {
+        "planes": ["xy", "xz", "yz", "tx", "ty", "tz"],
+        "sizes": field.layout.sizes.tolist(),
+        "channels": field.layout.channels,
+        "head": [list(w.shape) for w in field.head],
+    }
+    return Deformation(
+        planes=field.planes.detach().numpy().astype(np.float32),
+        weights=np.concatenate([w.detach().numpy().reshape(-1) for w in field.head]).astype(np.float32),
+        layout=json.dumps(layout, sort_keys=True),
+        low=field.low.astype(np.float32),
+        high=field.high.astype(np.float32),
+        history=np.asarray(history, np.float32).reshape(-1, 5),
+    )
+
+
+def load_field(deformation: Deformation) -> Field:
+    """The field a reconstruction stored. Raises Problem if its layout and numbers do not fit."""
+    told = json.loads(deformation.layout)
+    layout = Layout(np.asarray(told["sizes"], np.int64), int(told["channels"]))
+    ends = np.cumsum([0] + [int(np.prod(shape)) for shape in told["head"]])
+    if layout.count != len(deformation.planes) or ends[-1] != len(deformation.weights):
+        raise Problem(
+            f"Deformation: its layout announces {layout.count} plane numbers and {ends[-1]} weights, and it holds "
+            f"{len(deformation.planes)} and {len(deformation.weights)}. Run the reconstruction again."
+        )
+    head = tuple(
+        torch.from_numpy(deformation.weights[a:b].reshape(shape).copy())
+        for a, b, shape in zip(ends, ends[1:], told["head"], strict=False)
+    )
+    low, high = deformation.low.astype(float), deformation.high.astype(float)
+    return Field(layout, low, high, torch.from_numpy(deformation.planes.copy()), head)
+
+
+def deform(scene: Scene, field: Field, time: float) -> Scene:
+    """The canonical scene as it is at `time` [s]; at 0 it is itself."""
+    with torch.no_grad():
+        moved, opacity, turn, grow = (a.numpy() for a in field(torch.from_numpy(scene.mean), time))
+    rotation = scene.rotation + turn
+    return Scene(
+        mean=scene.mean + moved,
+        opacity=scene.opacity + opacity,
+        scale=scene.scale + grow,
+        rotation=rotation / np.linalg.norm(rotation, axis=1, keepdims=True),
+        color=scene.color,
+    )
+
+
+def displace(points: np.ndarray, field: Field, time: float) -> np.ndarray:
+    """Where any points of the rest scene are at `time` [s]; camera frame [m], (..., 3)."""
+    with torch.no_grad():
+        flat = torch.tensor(np.asarray(points).reshape(-1, 3), dtype=torch.float32)
+        return (flat + field(flat, time)[0]).numpy().reshape(np.shape(points))

@@ -1,0 +1,60 @@
+"""What the reconstruction may look at, and how much each pixel counts.
+
+Frames held out between used ones are left out here, at the door: nothing behind it can see them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from surgisim.artifacts.depth import Depth
+from surgisim.artifacts.frames import BETWEEN, Frames
+from surgisim.artifacts.inpainted import COPIED, INVENTED, SEEN, Inpainted
+from surgisim.artifacts.masks import Masks
+from surgisim.config.reconstruction import Reconstruction
+from surgisim.problem import Problem
+
+
+@dataclass(frozen=True)
+class Observations:
+    """U frames that may be looked at."""
+
+    frame: np.ndarray
+    """Their numbers in the clip, (U,)."""
+    rgb: torch.Tensor
+    """Colour with the instrument taken out, sRGB 0-1, (U, H, W, 3)."""
+    weight: torch.Tensor
+    """How much each pixel's colour counts, 0-1, (U, H, W)."""
+    z: torch.Tensor
+    """Depth [m], (U, H, W)."""
+    trust: torch.Tensor
+    """How much each pixel's depth counts, 0-1, (U, H, W)."""
+
+
+def observe(frames: Frames, inpainted: Inpainted, masks: Masks, depth: Depth, settings: Reconstruction) -> Observations:
+    """The used frames with their weights. Raises Problem if the inputs are not of one clip."""
+    sizes = {"frames": frames.rgb.shape[:3], "inpainted": inpainted.rgb.shape[:3]}
+    sizes |= {"masks": masks.tool.shape, "depth": depth.z.shape}
+    if len(set(sizes.values())) > 1:
+        raise Problem(f"reconstruction: {sizes} are not of one clip (frames, height, width). Check which are passed.")
+    used = np.flatnonzero(frames.split != BETWEEN)
+    if len(used) == 0 or used[0] != 0:
+        raise Problem("reconstruction: frame 0 is held out, but it is the rest scene. Correct the split.")
+    origin, tool, tissue = (a[used] for a in (inpainted.origin, masks.tool, masks.tissue))
+    # An instrument's pixel that was not painted over shows the instrument: it counts nothing.
+    weight = ((origin == SEEN) & tissue & ~tool).astype(np.float32)
+    weight[(origin == SEEN) & masks.specular[used] & ~tool] = settings.weight_specular
+    weight[origin == COPIED] = settings.weight_copied
+    weight[origin == INVENTED] = settings.weight_invented
+    shown = (weight > 0) | tissue
+    trust = depth.confidence[used].astype(np.float32) * shown
+    if not weight[0].any():
+        raise Problem("reconstruction: frame 0 shows no tissue. Check the masks, or start the clip later.")
+    return Observations(
+        frame=used,
+        rgb=torch.from_numpy(inpainted.rgb[used].astype(np.float32) / 255),
+        weight=torch.from_numpy(weight),
+        z=torch.from_numpy(depth.z[used].astype(np.float32)),
+        trust=torch.from_numpy(trust),
+    )
