@@ -60,7 +60,7 @@ def _clip(row: dict[str, Any], table: Path) -> Clip:
     for column, cell in row.items():
         if column in ("name", "path") or not cell.strip():
             continue
-        put(overrides, SHORT.get(column, column), value(cell))
+        put(overrides, SHORT.get(column, column), value(cell, table.parent))
     return Clip(name, None if path == EMBEDDED else (table.parent / path).resolve(), overrides)
 
 
@@ -72,10 +72,14 @@ def put(tree: dict[str, Any], key: str, content: Any) -> None:
     tree[last] = content
 
 
-def value(text: str) -> Any:
-    """A cell or a command-line value as YAML reads it; '31,20' is a list."""
+def value(text: str, folder: Path) -> Any:
+    """A cell or a command-line value as YAML reads it; '31,20' is a list, '@clicks.json' what that file holds."""
     text = text.strip()
     try:
+        if text.startswith("@"):
+            return yaml.safe_load((folder / text[1:]).read_text())
         return yaml.safe_load(f"[{text}]" if "," in text and text[0] not in "[{\"'" else text)
-    except yaml.YAMLError:
-        return text
+    except FileNotFoundError:
+        raise Problem(f"{folder / text[1:]}: no such file, but '{text}' asks for its content.") from None
+    except yaml.YAMLError as error:
+        raise Problem(f"'{text}' is not YAML ({' '.join(str(error).split())}).") from error

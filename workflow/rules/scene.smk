@@ -39,7 +39,7 @@ rule thickening:
         camera=upstream("ingest", "camera.json"),
     output:
         body="results/{clip}/{variant}/thickening/body.npz",
-        cloud="results/{clip}/{variant}/thickening/body.ply",
+        points="results/{clip}/{variant}/thickening/body.ply",
     log:
         "logs/{clip}/{variant}/thickening.log",
     benchmark:
@@ -53,5 +53,5 @@ rule thickening:
         code=code("thickening"),
     shell:
         'python "$SURGISIM/stages/thickening.py"'
-        " --scene {input.scene} --camera {input.camera} --body {output.body} --cloud {output.cloud}"
+        " --scene {input.scene} --camera {input.camera} --body {output.body} --points {output.points}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"

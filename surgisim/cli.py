@@ -1,0 +1,106 @@
+"""The command `surgisim`: run the graph on a clip, and say what this machine and this project have."""
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from surgisim.stage import plain_errors
+
+app = typer.Typer(
+    help="From a monocular surgical video to a simulation with the tissue's own physics.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+
+Out = Annotated[Path, typer.Option(help="Folder for results/, logs/ and benchmarks/.")]
+Variants = Annotated[list[str] | None, typer.Option("--variant", help="Variant to run; repeat it, or say 'all'.")]
+Config = Annotated[
+    list[Path] | None, typer.Option(help="YAML file of the keys of config.yaml that differ; repeatable.")
+]
+Set = Annotated[list[str] | None, typer.Option("--set", metavar="STAGE.KEY=VALUE", help="One such key; repeatable.")]
+Cores = Annotated[str, typer.Option(help="How many cores to use: a number or 'all'.")]
+Profile = Annotated[str | None, typer.Option(help="Where to run: gpu, slurm, or a folder with a Snakemake profile.")]
+Until = Annotated[str | None, typer.Option(help="Stop after this stage.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Only say what would run.")]
+Debug = Annotated[bool, typer.Option(help="Show everything Snakemake says, and tracebacks.")]
+
+
+@app.command()
+def run(
+    clip: Annotated[str, typer.Argument(help="A video, image folder, EndoNeRF folder or zip, or a table clips.tsv.")],
+    out: Out = Path(),
+    name: Annotated[str | None, typer.Option(help="What to call the clip; its file name unless said.")] = None,
+    focal: Annotated[float | None, typer.Option(help="Focal length in the recording's own pixels [px].")] = None,
+    grasp: Annotated[str | None, typer.Option(metavar="X,Y", help="Where the tool grasps, in frame 0 [px].")] = None,
+    variant: Variants = None,
+    config: Config = None,
+    set_: Set = None,
+    cores: Cores = "all",
+    profile: Profile = None,
+    until: Until = None,
+    dry_run: DryRun = False,
+    debug: Debug = False,
+) -> None:
+    """Run the whole graph on a clip; a second run does only what changed."""
+    from surgisim.order import Order, carry_out
+
+    extra = [f"ingest.focal={focal}"] if focal is not None else []
+    extra += [f"tracking.grasp={grasp}"] if grasp else []
+    with plain_errors(debug):
+        title = name or re.sub(r"[^A-Za-z0-9_-]+", "_", Path(clip).name.removesuffix(Path(clip).suffix)).strip("_")
+        order = Order(
+            clip=clip,
+            name=title or "clip",
+            out=out,
+            variants=tuple(variant or ()),
+            configs=tuple(config or ()),
+            settings=(*(set_ or ()), *extra),
+            cores=cores,
+            profile=profile,
+            until=until,
+            dry=dry_run,
+            debug=debug,
+        )
+        code = carry_out(order)
+    raise typer.Exit(code)
+
+
+@app.command()
+def demo(
+    out: Out = Path(),
+    variant: Variants = None,
+    config: Config = None,
+    set_: Set = None,
+    cores: Cores = "all",
+    profile: Profile = None,
+    until: Until = None,
+    dry_run: DryRun = False,
+    debug: Debug = False,
+) -> None:
+    """Run the whole graph on the embedded clip, whose truth is known."""
+    run("phantom", out, "demo", None, None, variant, config, set_, cores, profile, until, dry_run, debug)
+
+
+@app.command()
+def doctor(config: Config = None, debug: Debug = False) -> None:
+    """Say what this machine has, and what that means for a run."""
+    from surgisim.doctor import examine
+
+    with plain_errors(debug):
+        examine(tuple(config or ()))
+
+
+@app.command()
+def terms(debug: Debug = False) -> None:
+    """List the laws a body can have: what each is for, its numbers, their ranges."""
+    from surgisim.doctor import laws
+
+    with plain_errors(debug):
+        laws()
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,158 @@
+"""What the user asked for, written down beside the results, run, and answered."""
+
+import difflib
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+from rich.console import Console
+from rich.markup import escape
+
+from surgisim.clips import EMBEDDED, put, value
+from surgisim.config.base import parse
+from surgisim.config.whole import PARENTS, Whole, rooted
+from surgisim.follow import follower
+from surgisim.launch import State, home, launch, why
+from surgisim.plan import Plan, merged, plan, read_variants
+from surgisim.problem import Problem
+
+
+@dataclass(frozen=True, kw_only=True)
+class Order:
+    clip: str
+    """A recording, a table of clips, or the name of the embedded one."""
+    name: str
+    out: Path
+    variants: tuple[str, ...]
+    configs: tuple[Path, ...]
+    settings: tuple[str, ...]
+    """'stage.key=value' entries; they win over `configs`."""
+    cores: str
+    profile: str | None
+    until: str | None
+    dry: bool
+    debug: bool
+
+
+def carry_out(order: Order) -> int:
+    """Check, write results/run.yaml, run the graph; the exit code."""
+    console = Console(highlight=False, soft_wrap=True)
+    place, out = home(), order.out.resolve()
+    choices = chosen(order.configs, order.settings)
+    variants = place / "config" / "variants.yaml"
+    known = tuple(read_variants(variants))
+    if order.variants:
+        choices["run"] = list(known if "all" in order.variants else order.variants)
+    table = Path(order.clip).resolve() if order.clip.endswith(".tsv") else out / "results" / "clips.tsv"
+    if not order.clip.endswith(".tsv"):
+        _write(table, f"name\tpath\n{order.name}\t{_recording(order.clip)}\n")
+    base = yaml.safe_load((place / "config" / "config.yaml").read_text())
+    todo = plan(merged(base, choices), clips=table, variants=variants)
+    _look_for(todo, table)
+    written = out / "results" / "run.yaml"
+    _write(written, yaml.safe_dump(choices | {"clips": str(table), "variants": str(variants)}))
+    began = time.monotonic()
+    arguments = _arguments(order, written)
+    try:
+        with follower(console, quiet=order.dry or order.debug) as show:
+            code, state = launch(out, arguments, show=show, debug=order.debug)
+    except KeyboardInterrupt:
+        console.print("stopped; the same command goes on from what was finished")
+        return 130
+    if order.dry:
+        _announce(console, state)
+        return code
+    return _answer(console, todo, out, code, state, order, time.monotonic() - began)
+
+
+def chosen(configs: tuple[Path, ...], settings: tuple[str, ...]) -> dict[str, Any]:
+    """The keys of config.yaml that the user changes, checked, with absolute paths."""
+    total: dict[str, Any] = {}
+    for path in configs:
+        if not path.is_file():
+            raise Problem(f"{path}: no such file, but --config names it.")
+        try:
+            raw = yaml.safe_load(path.read_text()) or {}
+        except yaml.YAMLError as error:
+            raise Problem(f"{path}: is not YAML ({' '.join(str(error).split())}).") from error
+        if not isinstance(raw, dict):
+            raise Problem(f"{path}: holds a {type(raw).__name__}, but keys of config.yaml are wanted there.")
+        parse(Whole, raw, str(path))
+        total = merged(total, rooted(raw, path.resolve().parent))
+    for entry in settings:
+        key, equals, text = entry.partition("=")
+        if not equals:
+            raise Problem(f"--set {entry}: STAGE.KEY=VALUE is wanted, for example ingest.size=160.")
+        one: dict[str, Any] = {}
+        put(one, key.strip(), value(text, Path.cwd()))
+        parse(Whole, one, f"--set {entry}")
+        total = merged(total, rooted(one, Path.cwd()))
+    return total
+
+
+def _recording(clip: str) -> str:
+    return EMBEDDED if clip == EMBEDDED else str(Path(clip).resolve())
+
+
+def _look_for(todo: Plan, table: Path) -> None:
+    for clip in todo.clips.values():
+        if clip.path and not clip.path.exists():
+            raise Problem(f"{clip.path}: no such video or folder, but clip '{clip.name}' is to be read from there.")
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.is_file() or path.read_text() != text:
+        path.write_text(text)
+
+
+def _arguments(order: Order, written: Path) -> list[str]:
+    arguments = ["--configfile", str(written), "--cores", order.cores]
+    if order.profile:
+        named = home() / "workflow" / "profiles" / order.profile
+        folder = named if named.is_dir() else Path(order.profile).resolve()
+        if not folder.is_dir():
+            raise Problem(f"--profile {order.profile}: no such folder; known by name: {_profiles()}.")
+        arguments += ["--profile", str(folder)]
+    if order.until:
+        stages = [*PARENTS, "summary"]
+        if order.until not in stages:
+            near = difflib.get_close_matches(order.until, stages, 1, 0.0)[0]
+            raise Problem(f"--until {order.until}: there is no such stage; did you mean '{near}'? Known: {stages}.")
+        arguments += ["--until", order.until]
+    return arguments + (["--dry-run"] if order.dry else [])
+
+
+def _profiles() -> str:
+    return ", ".join(sorted(p.name for p in (home() / "workflow" / "profiles").iterdir()))
+
+
+def _announce(console: Console, state: State) -> None:
+    for job in state.jobs.values():
+        if job.rule != "all":
+            console.print(f"would run {escape(job.name)}")
+    if not state.jobs:
+        console.print("everything is up to date")
+
+
+def _answer(console: Console, todo: Plan, out: Path, code: int, state: State, order: Order, seconds: float) -> int:
+    for job in state.failed:
+        console.print(f"[red]error[/]: {escape(job.name)}: {escape(why(job))}")
+    if code and not state.failed:
+        said = state.complaints or state.said or ["Snakemake stopped without a word"]
+        console.print(f"[red]error[/]: {escape(' '.join(said[-1 if order.debug else 0].split()))}")
+    if code:
+        console.print("The same command goes on from here once this is mended; what was finished is kept.")
+        return 2 if state.failed and all(" fault of the program" not in why(j) for j in state.failed) else code
+    did = [job for job in state.jobs.values() if job.rule != "all"]
+    console.print(f"{len(did)} jobs in {seconds:.0f} s" if did else "nothing to do: everything is up to date")
+    for clip in todo.clips:
+        for variant in todo.run:
+            page = out / "results" / clip / variant / "report" / "report.html"
+            if page.is_file():
+                console.print(f"report   {escape(str(page))}")
+    if (out / "results" / "summary.html").is_file():
+        console.print(f"summary  {escape(str(out / 'results' / 'summary.html'))}")
+    return 0
