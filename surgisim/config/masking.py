@@ -1,0 +1,39 @@
+"""How the instrument is told from the tissue."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from surgisim.config.base import Settings
+
+
+class Click(Settings):
+    """A point the user marked."""
+
+    frame: Annotated[int, Field(ge=0)]
+    """Which frame it was marked in [frame]."""
+    x: float
+    """To the right, at the working size [px]."""
+    y: float
+    """Down, at the working size [px]."""
+    label: Literal["tool", "tissue"] = "tool"
+    """What is there [name]."""
+
+
+class Masking(Settings):
+    backend: str = "auto"
+    """auto takes masks that came with the recording and else colour_motion; or a file of
+    surgisim/perception/masking: colour_motion, given, sam2 [name]."""
+    clicks: list[Click] = []
+    """Points the user marked as tool or tissue [list]."""
+    require_tool: bool = False
+    """Whether a clip in which no instrument is found is refused [yes/no]."""
+    margin: Annotated[int, Field(ge=0)] = 1
+    """How far around the instrument the tissue is left out too, because its outline mixes both [px]."""
+    refine: bool = True
+    """Whether the outline is drawn to the nearest edge by GrabCut [yes/no]."""
+    encoder: Path | None = None
+    """SAM 2's image encoder for the backend sam2, an ONNX file [path]."""
+    decoder: Path | None = None
+    """SAM 2's mask decoder for the backend sam2, an ONNX file [path]."""

@@ -1,0 +1,76 @@
+"""Masks of a whole clip: what is left out, what is a highlight, what is tissue."""
+
+import importlib
+import importlib.util
+import pkgutil
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+
+from surgisim.artifacts.frames import Frames
+from surgisim.artifacts.given import Given
+from surgisim.artifacts.masks import Masks
+from surgisim.config.masking import Masking
+from surgisim.perception import masking
+from surgisim.perception.masking.appearance import lit, specular
+from surgisim.problem import Problem
+
+Progress = Callable[[float, float, str], None]
+
+
+def masks(frames: Frames, given: Given, settings: Masking, *, progress: Progress) -> Masks:
+    """Instrument by the chosen backend; tissue is what is lit, at some distance from it."""
+    _check_clicks(frames, settings)
+    name = settings.backend
+    if name == "auto":
+        name = "given" if len(given.tool) else "colour_motion"
+    tool, confidence = _backend(name)(frames, given, settings, progress)
+    _say_what_was_found(tool, confidence, name, settings, progress)
+    around = np.stack([_wider(m, settings.margin) for m in tool])
+    return Masks(tool, lit(frames.rgb) & ~around, specular(frames.rgb, tool), confidence.astype(np.float32))
+
+
+def _backend(name: str) -> Callable:
+    files = [m.name for m in pkgutil.iter_modules(masking.__path__)]
+    known = [f for f in files if f not in ("appearance", "outline", "shape")]
+    if name not in known:
+        raise Problem(
+            f"config key 'masking.backend' is '{name}', and surgisim/perception/masking/ holds {sorted(known)}. "
+            "Choose one of them, or auto."
+        )
+    return importlib.import_module(f"{masking.__name__}.{name}").tool
+
+
+def _check_clicks(frames: Frames, settings: Masking) -> None:
+    count, height, width = frames.rgb.shape[:3]
+    for click in settings.clicks:
+        if not (click.frame < count and 0 <= click.x <= width - 1 and 0 <= click.y <= height - 1):
+            raise Problem(
+                f"config key 'masking.clicks' marks frame {click.frame} at ({click.x:g}, {click.y:g}), but there are "
+                f"{count} frames of {width} x {height} px. Give clicks at the working size."
+            )
+
+
+def _say_what_was_found(tool, confidence, name: str, settings: Masking, progress: Progress) -> None:
+    count = len(tool)
+    if tool.any():
+        share = tool.mean((1, 2))
+        progress(
+            count,
+            count,
+            f"instrument ({name}) in {int((share > 0).sum())} of {count} frames, {100 * share.mean():.1f} % of the "
+            f"picture, confidence {confidence.mean():.2f}",
+        )
+        return
+    words = f"no instrument was found ({name})"
+    if settings.require_tool:
+        raise Problem(f"{words}, and masking.require_tool asks for one. Mark it with masking.clicks, or pass masks.")
+    progress(count, count, f"{words}; every pixel counts as tissue. Mark it with masking.clicks if there is one")
+
+
+def _wider(mask: np.ndarray, margin: int) -> np.ndarray:
+    if margin == 0:
+        return mask
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * margin + 1, 2 * margin + 1))
+    return cv2.dilate(mask.astype(np.uint8), disc).astype(bool)
