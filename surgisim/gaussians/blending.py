@@ -18,12 +18,15 @@ from llvmlite import ir
 from numba import njit, prange, types
 from numba.extending import intrinsic
 
-from surgisim.gaussians.projection import ALPHA_MAX, ALPHA_MIN
+from surgisim.gaussians.projection import ALPHA_MAX, ALPHA_MIN, BLUE, GREEN, OPACITY, RED, XX, XY, YY, X, Y, Z
 from surgisim.gaussians.tiles import TILE
 
 f4 = np.float32
+u8 = np.uint64
 PIXELS = TILE * TILE
 BLOCK = 8
+# Unsigned, and one array for all: what Numba needs to know that an index is not negative and nothing overlaps.
+L1, L2, L3, L4, L5, L6 = u8(PIXELS), u8(2 * PIXELS), u8(3 * PIXELS), u8(4 * PIXELS), u8(5 * PIXELS), u8(6 * PIXELS)
 T_MIN = f4(1e-4)
 A_MIN, A_MAX = f4(ALPHA_MIN), f4(ALPHA_MAX)
 ONE, ZERO, HALF = f4(1), f4(0), f4(0.5)
@@ -61,53 +64,47 @@ def blend(ellipse, box, start, gaussian, number, background, rgb, depth, through
     across = -(-width // TILE)
     for t in prange(len(start) - 1):
         left, top = (t % across) * TILE, (t // across) * TILE
-        T = np.zeros(PIXELS, f4)  # stays 0 where the tile hangs over the image's edge
-        for row in range(min(TILE, height - top)):
-            T[row * TILE : row * TILE + min(TILE, width - left)] = ONE
-        layers = np.zeros(4 * PIXELS, f4)
-        final = np.full(PIXELS, -1, np.int32)
+        rows, cols = min(TILE, height - top), min(TILE, width - left)
+        # T, colour, depth and last of the tile's pixels. T stays 0 where the tile hangs over the image's edge.
+        tile = np.zeros(6 * PIXELS, f4)
+        for row in range(rows):
+            tile[row * TILE : row * TILE + cols] = ONE
         for entry in range(start[t], start[t + 1]):
-            if (entry - start[t]) % 32 == 31 and T.max() < T_MIN:
+            if (entry - start[t]) % 32 == 31 and tile[:PIXELS].max() < T_MIN:
                 break
             g = gaussian[entry]
-            mx, my, z = ellipse[g, 0] - f4(left), ellipse[g, 1] - f4(top), ellipse[g, 9]
-            a, b, c, o = HALF * ellipse[g, 2], ellipse[g, 3], HALF * ellipse[g, 4], ellipse[g, 5]
-            red, green, blue = ellipse[g, 6], ellipse[g, 7], ellipse[g, 8]
+            mx, my, z = ellipse[g, X] - f4(left), ellipse[g, Y] - f4(top), ellipse[g, Z]
+            a, b, c, o = HALF * ellipse[g, XX], ellipse[g, XY], HALF * ellipse[g, YY], ellipse[g, OPACITY]
+            red, green, blue = ellipse[g, RED], ellipse[g, GREEN], ellipse[g, BLUE]
             c0, c1 = (max(box[g, 0], left) - left) // BLOCK, (min(box[g, 1], left + TILE) - 1 - left) // BLOCK
-            total = ZERO
-            here = np.int32(entry)
+            here, total = f4(entry - start[t] + 1), ZERO
             for row in range(max(box[g, 2], top) - top, min(box[g, 3], top + TILE) - top):
                 dy = f4(row) - my
                 for col in range(c0, c1 + 1):
-                    p0 = row * TILE + col * BLOCK
-                    x0 = f4(col * BLOCK) - mx
-                    tT, tF = T[p0 : p0 + BLOCK], final[p0 : p0 + BLOCK]
-                    tR, tG = layers[p0 : p0 + BLOCK], layers[p0 + PIXELS : p0 + PIXELS + BLOCK]
-                    tB = layers[p0 + 2 * PIXELS : p0 + 2 * PIXELS + BLOCK]
-                    tZ = layers[p0 + 3 * PIXELS : p0 + 3 * PIXELS + BLOCK]
+                    first, x0 = u8(row * TILE + col * BLOCK), f4(col * BLOCK) - mx
                     for i in range(BLOCK):
-                        dx = x0 + f4(i)
+                        p, dx = first + u8(i), x0 + f4(i)
                         A = o * exp_negative(dx * (a * dx + b * dy) + c * dy * dy)
                         A = A_MAX if A > A_MAX else A
                         A = ZERO if A < A_MIN else A
-                        A = ZERO if tT[i] < T_MIN else A
-                        w = A * tT[i]
-                        tF[i] = tF[i] if A == ZERO else here
-                        tT[i] -= w
-                        tR[i] += w * red
-                        tG[i] += w * green
-                        tB[i] += w * blue
-                        tZ[i] += w * z
+                        A = ZERO if tile[p] < T_MIN else A
+                        w = A * tile[p]
+                        tile[p] -= w
+                        tile[p + L1] += w * red
+                        tile[p + L2] += w * green
+                        tile[p + L3] += w * blue
+                        tile[p + L4] += w * z
+                        tile[p + L5] = tile[p + L5] if A == ZERO else here
                         total += w
             weight[number[entry]] = total
-        for row in range(min(TILE, height - top)):
-            for col in range(min(TILE, width - left)):
-                p = row * TILE + col
-                for k in range(3):
-                    rgb[top + row, left + col, k] = layers[p + k * PIXELS] + T[p] * background[k]
-                depth[top + row, left + col] = layers[p + 3 * PIXELS]
-                through[top + row, left + col] = T[p]
-                last[top + row, left + col] = final[p]
+        for row in range(rows):
+            for col in range(cols):
+                p, y, x = u8(row * TILE + col), top + row, left + col
+                rgb[y, x, 0] = tile[p + L1] + tile[p] * background[0]
+                rgb[y, x, 1] = tile[p + L2] + tile[p] * background[1]
+                rgb[y, x, 2] = tile[p + L3] + tile[p] * background[2]
+                depth[y, x], through[y, x] = tile[p + L4], tile[p]
+                last[y, x] = int(tile[p + L5])
 
 
 @njit(cache=True, parallel=True, fastmath=FAST, error_model="numpy")
@@ -121,61 +118,52 @@ def blend_back(ellipse, box, start, gaussian, number, background, through, last,
     across = -(-width // TILE)
     for t in prange(len(start) - 1):
         left, top = (t % across) * TILE, (t // across) * TILE
-        T = np.ones(PIXELS, f4)
-        behind = np.zeros(PIXELS, f4)
-        final = np.full(PIXELS, -1, np.int32)
-        d = np.zeros(4 * PIXELS, f4)
+        # T, gradients of colour and depth, last, and the sum behind, of the tile's pixels.
+        tile = np.zeros(7 * PIXELS, f4)
+        farthest = 0
         for row in range(min(TILE, height - top)):
             for col in range(min(TILE, width - left)):
-                p, y, x = row * TILE + col, top + row, left + col
-                T[p], final[p] = through[y, x], last[y, x]
-                for k in range(3):
-                    d[p + k * PIXELS] = d_rgb[y, x, k]
-                    behind[p] += background[k] * d_rgb[y, x, k]
-                d[p + 3 * PIXELS] = d_depth[y, x]
-                behind[p] = T[p] * (behind[p] - d_alpha[y, x])
-        farthest = final.max()
-        for entry in range(start[t + 1] - 1, start[t] - 1, -1):
-            if entry > farthest:
-                continue
+                p, y, x = u8(row * TILE + col), top + row, left + col
+                red, green, blue = d_rgb[y, x, 0], d_rgb[y, x, 1], d_rgb[y, x, 2]
+                tile[p], tile[p + L4], tile[p + L5] = through[y, x], d_depth[y, x], last[y, x]
+                tile[p + L1], tile[p + L2], tile[p + L3] = red, green, blue
+                back = background[0] * red + background[1] * green + background[2] * blue
+                tile[p + L6] = through[y, x] * (back - d_alpha[y, x])
+                farthest = max(farthest, last[y, x])
+        for entry in range(start[t] + farthest - 1, start[t] - 1, -1):
             g = gaussian[entry]
-            mx, my, z = ellipse[g, 0] - f4(left), ellipse[g, 1] - f4(top), ellipse[g, 9]
-            a, b, c, o = HALF * ellipse[g, 2], ellipse[g, 3], HALF * ellipse[g, 4], ellipse[g, 5]
-            red, green, blue = ellipse[g, 6], ellipse[g, 7], ellipse[g, 8]
+            mx, my, z = ellipse[g, X] - f4(left), ellipse[g, Y] - f4(top), ellipse[g, Z]
+            a, b, c, o = HALF * ellipse[g, XX], ellipse[g, XY], HALF * ellipse[g, YY], ellipse[g, OPACITY]
+            red, green, blue = ellipse[g, RED], ellipse[g, GREEN], ellipse[g, BLUE]
             c0, c1 = (max(box[g, 0], left) - left) // BLOCK, (min(box[g, 1], left + TILE) - 1 - left) // BLOCK
-            here = np.int32(entry)
+            here = f4(entry - start[t] + 1)
             wR, wG, wB, wZ = ZERO, ZERO, ZERO, ZERO
             q, qx, qy, qxx, qxy, qyy = ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
             for row in range(max(box[g, 2], top) - top, min(box[g, 3], top + TILE) - top):
                 dy = f4(row) - my
                 s, sx, sxx = ZERO, ZERO, ZERO
                 for col in range(c0, c1 + 1):
-                    p0 = row * TILE + col * BLOCK
-                    x0 = f4(col * BLOCK) - mx
-                    tT, tF, tS = T[p0 : p0 + BLOCK], final[p0 : p0 + BLOCK], behind[p0 : p0 + BLOCK]
-                    tR, tG = d[p0 : p0 + BLOCK], d[p0 + PIXELS : p0 + PIXELS + BLOCK]
-                    tB = d[p0 + 2 * PIXELS : p0 + 2 * PIXELS + BLOCK]
-                    tZ = d[p0 + 3 * PIXELS : p0 + 3 * PIXELS + BLOCK]
+                    first, x0 = u8(row * TILE + col * BLOCK), f4(col * BLOCK) - mx
                     for i in range(BLOCK):
-                        dx = x0 + f4(i)
+                        p, dx = first + u8(i), x0 + f4(i)
                         A = o * exp_negative(dx * (a * dx + b * dy) + c * dy * dy)
                         held = A > A_MAX
                         A = A_MAX if held else A
                         A = ZERO if A < A_MIN else A
-                        A = ZERO if tF[i] < here else A
+                        A = ZERO if tile[p + L5] < here else A
                         clear = ONE / (ONE - A)
-                        before = tT[i] * clear
-                        v = red * tR[i] + green * tG[i] + blue * tB[i] + z * tZ[i]
+                        before = tile[p] * clear
                         w = A * before
+                        v = red * tile[p + L1] + green * tile[p + L2] + blue * tile[p + L3] + z * tile[p + L4]
                         # -alpha d alpha = d sigma; none where alpha is held at its largest.
-                        m = A * (tS[i] * clear - before * v)
+                        m = A * (tile[p + L6] * clear - before * v)
                         m = ZERO if held else m
-                        tS[i] += w * v
-                        tT[i] = before
-                        wR += w * tR[i]
-                        wG += w * tG[i]
-                        wB += w * tB[i]
-                        wZ += w * tZ[i]
+                        tile[p + L6] += w * v
+                        tile[p] = before
+                        wR += w * tile[p + L1]
+                        wG += w * tile[p + L2]
+                        wB += w * tile[p + L3]
+                        wZ += w * tile[p + L4]
                         s += m
                         sx += m * dx
                         sxx += m * dx * dx
@@ -186,10 +174,10 @@ def blend_back(ellipse, box, start, gaussian, number, background, through, last,
                 qxy += sx * dy
                 qyy += s * dy * dy
             n = number[entry]
-            d_entry[n, 0], d_entry[n, 1] = -(f4(2) * a * qx + b * qy), -(b * qx + f4(2) * c * qy)
-            d_entry[n, 2], d_entry[n, 3], d_entry[n, 4] = HALF * qxx, qxy, HALF * qyy
-            d_entry[n, 5] = -q / o
-            d_entry[n, 6], d_entry[n, 7], d_entry[n, 8], d_entry[n, 9] = wR, wG, wB, wZ
+            d_entry[n, X], d_entry[n, Y] = -(f4(2) * a * qx + b * qy), -(b * qx + f4(2) * c * qy)
+            d_entry[n, XX], d_entry[n, XY], d_entry[n, YY] = HALF * qxx, qxy, HALF * qyy
+            d_entry[n, OPACITY] = -q / o
+            d_entry[n, RED], d_entry[n, GREEN], d_entry[n, BLUE], d_entry[n, Z] = wR, wG, wB, wZ
 
 
 @njit(cache=True, parallel=True)

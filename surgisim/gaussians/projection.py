@@ -13,7 +13,6 @@ Drettakis, 3D Gaussian splatting for real-time radiance field rendering, SIGGRAP
 
 import math
 
-import numpy as np
 from numba import njit, prange
 
 LOW_PASS = 0.3
@@ -36,14 +35,12 @@ def project(mean, rotation, scale, opacity, color, lens, near, ellipse, box):
     fx, fy, cx, cy, width, height = lens
     for g in prange(len(mean)):
         box[g, 0] = box[g, 1] = box[g, 2] = box[g, 3] = 0
-        z = float(mean[g, 2])
+        x, y, z = float(mean[g, 0]), float(mean[g, 1]), float(mean[g, 2])
         if z < near or opacity[g] < ALPHA_MIN:
             continue
-        x, y = float(mean[g, 0]), float(mean[g, 1])
-        V, _, _, _, _, _ = _view(x, y, z, rotation[g], scale[g], lens)
-        a = V[0, 0] ** 2 + V[0, 1] ** 2 + V[0, 2] ** 2 + LOW_PASS
-        b = V[0, 0] * V[1, 0] + V[0, 1] * V[1, 1] + V[0, 2] * V[1, 2]
-        c = V[1, 0] ** 2 + V[1, 1] ** 2 + V[1, 2] ** 2 + LOW_PASS
+        R = _matrix(float(rotation[g, 0]), float(rotation[g, 1]), float(rotation[g, 2]), float(rotation[g, 3]))
+        S = (float(scale[g, 0]), float(scale[g, 1]), float(scale[g, 2]))
+        a, b, c = _covariance(*_axes(R, S, *_slope(x / z, y / z, fx, fy, cx, cy, width, height), fx / z, fy / z))
         det = a * c - b * b
         px, py = fx * x / z + cx, fy * y / z + cy
         # Where opacity * exp(-sigma) falls to ALPHA_MIN the ellipse ends; the box is exact, not a multiple of sigma.
@@ -63,112 +60,110 @@ def project(mean, rotation, scale, opacity, color, lens, near, ellipse, box):
 @njit(cache=True, parallel=True, error_model="numpy")
 def project_back(mean, rotation, scale, lens, box, d_ellipse, d_mean, d_rotation, d_scale, d_opacity, d_color):
     """Write the gradients of the five attributes, given those of the ellipses, (G, 10)."""
-    fx, fy = lens[0], lens[1]
+    fx, fy, cx, cy, width, height = lens
     for g in prange(len(mean)):
-        d_mean[g] = 0
-        d_rotation[g] = 0
-        d_scale[g] = 0
-        d_color[g] = 0
-        d_opacity[g] = 0
+        d_mean[g, 0] = d_mean[g, 1] = d_mean[g, 2] = 0
+        d_scale[g, 0] = d_scale[g, 1] = d_scale[g, 2] = 0
+        d_rotation[g, 0] = d_rotation[g, 1] = d_rotation[g, 2] = d_rotation[g, 3] = 0
+        d_opacity[g] = d_color[g, 0] = d_color[g, 1] = d_color[g, 2] = 0
         if box[g, 0] == box[g, 1]:
             continue
         d_opacity[g] = d_ellipse[g, OPACITY]
         d_color[g, 0], d_color[g, 1], d_color[g, 2] = d_ellipse[g, RED], d_ellipse[g, GREEN], d_ellipse[g, BLUE]
         x, y, z = float(mean[g, 0]), float(mean[g, 1]), float(mean[g, 2])
-        V, J, R, q, u, v = _view(x, y, z, rotation[g], scale[g], lens)
-        a = V[0, 0] ** 2 + V[0, 1] ** 2 + V[0, 2] ** 2 + LOW_PASS
-        b = V[0, 0] * V[1, 0] + V[0, 1] * V[1, 1] + V[0, 2] * V[1, 2]
-        c = V[1, 0] ** 2 + V[1, 1] ** 2 + V[1, 2] ** 2 + LOW_PASS
+        q = (float(rotation[g, 0]), float(rotation[g, 1]), float(rotation[g, 2]), float(rotation[g, 3]))
+        S = (float(scale[g, 0]), float(scale[g, 1]), float(scale[g, 2]))
+        R = _matrix(*q)
+        u, v = _slope(x / z, y / z, fx, fy, cx, cy, width, height)
+        j, k = fx / z, fy / z
+        V0, V1 = _axes(R, S, u, v, j, k)
+        a, b, c = _covariance(V0, V1)
         det = a * c - b * b
-        k, m, n = c / det, -b / det, a / det
-        # d cov = -K dK K, with K = [[k, m], [m, n]] and dK = [[e, h/2], [h/2, f]]
+        p, m, n = c / det, -b / det, a / det
+        # d cov = -K dK K, with K = [[p, m], [m, n]] and dK = [[e, h/2], [h/2, f]]
         e, h, f = float(d_ellipse[g, XX]), float(d_ellipse[g, XY]), float(d_ellipse[g, YY])
-        d_a = -(k * k * e + k * m * h + m * m * f)
-        d_b = -(2.0 * k * m * e + (k * n + m * m) * h + 2.0 * m * n * f)
+        d_a = -(p * p * e + p * m * h + m * m * f)
+        d_b = -(2.0 * p * m * e + (p * n + m * m) * h + 2.0 * m * n * f)
         d_c = -(m * m * e + m * n * h + n * n * f)
-        d_V = np.empty((2, 3))
+        d_J00, d_J02, d_J11, d_J12 = 0.0, 0.0, 0.0, 0.0
+        d_w, d_x, d_y, d_z = 0.0, 0.0, 0.0, 0.0
         for i in range(3):
-            d_V[0, i] = 2.0 * d_a * V[0, i] + d_b * V[1, i]
-            d_V[1, i] = 2.0 * d_c * V[1, i] + d_b * V[0, i]
-        d_J = np.zeros((2, 3))
-        d_R = np.empty((3, 3))
-        for i in range(3):
-            s = float(scale[g, i])
-            total = 0.0
-            for r in range(3):
-                d_M = J[0, r] * d_V[0, i] + J[1, r] * d_V[1, i]
-                total += d_M * R[r, i]
-                d_R[r, i] = d_M * s
-                d_J[0, r] += d_V[0, i] * R[r, i] * s
-                d_J[1, r] += d_V[1, i] * R[r, i] * s
-            d_scale[g, i] = total
-        _turn_back(d_R, q, rotation[g], d_rotation[g])
-        d_x = fx / z * d_ellipse[g, X]
-        d_y = fy / z * d_ellipse[g, Y]
-        d_z = d_ellipse[g, Z] - (d_x * x + d_y * y) / z
-        d_z += (-fx * d_J[0, 0] + fx * u * d_J[0, 2] - fy * d_J[1, 1] + fy * v * d_J[1, 2]) / (z * z)
-        d_u, d_v = -fx / z * d_J[0, 2], -fy / z * d_J[1, 2]
+            d_0, d_1 = 2.0 * d_a * V0[i] + d_b * V1[i], 2.0 * d_c * V1[i] + d_b * V0[i]
+            # Column i of d(R S): J^T dV, with J = [[j, 0, -j u], [0, k, -k v]].
+            d_M0, d_M1, d_M2 = j * d_0, k * d_1, -(j * u * d_0 + k * v * d_1)
+            d_scale[g, i] = d_M0 * R[0][i] + d_M1 * R[1][i] + d_M2 * R[2][i]
+            d_J00 += d_0 * R[0][i] * S[i]
+            d_J02 += d_0 * R[2][i] * S[i]
+            d_J11 += d_1 * R[1][i] * S[i]
+            d_J12 += d_1 * R[2][i] * S[i]
+            turn = _turn(q, i, d_M0 * S[i], d_M1 * S[i], d_M2 * S[i])
+            d_w, d_x, d_y, d_z = d_w + turn[0], d_x + turn[1], d_y + turn[2], d_z + turn[3]
+        d_rotation[g, 0], d_rotation[g, 1], d_rotation[g, 2], d_rotation[g, 3] = d_w, d_x, d_y, d_z
+
+        d_px, d_py = j * d_ellipse[g, X], k * d_ellipse[g, Y]
+        depth = d_ellipse[g, Z] - (d_px * x + d_py * y) / z
+        depth += (-j * d_J00 + j * u * d_J02 - k * d_J11 + k * v * d_J12) / z
         if u == x / z:
-            d_x += d_u / z
-            d_z -= d_u * u / z
+            d_px -= j * d_J02 / z
+            depth += j * d_J02 * u / z
         if v == y / z:
-            d_y += d_v / z
-            d_z -= d_v * v / z
-        d_mean[g, 0], d_mean[g, 1], d_mean[g, 2] = d_x, d_y, d_z
+            d_py -= k * d_J12 / z
+            depth += k * d_J12 * v / z
+        d_mean[g, 0], d_mean[g, 1], d_mean[g, 2] = d_px, d_py, depth
 
 
 @njit(cache=True, error_model="numpy")
-def _view(x, y, z, rotation, scale, lens):
-    """V = J R S (2, 3), J (2, 3), R (3, 3), the unit quaternion, and u, v as J uses them; all in float64."""
-    fx, fy, cx, cy, width, height = lens
-    u = min(max(x / z, -cx / fx - 0.15 * width / fx), (width - cx) / fx + 0.15 * width / fx)
-    v = min(max(y / z, -cy / fy - 0.15 * height / fy), (height - cy) / fy + 0.15 * height / fy)
-    J = np.zeros((2, 3))
-    J[0, 0], J[0, 2] = fx / z, -fx * u / z
-    J[1, 1], J[1, 2] = fy / z, -fy * v / z
-    q = rotation.astype(np.float64)
-    q /= math.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
-    w, i, j, k = q
-    R = np.empty((3, 3))
-    R[0, 0], R[0, 1], R[0, 2] = 1 - 2 * (j * j + k * k), 2 * (i * j - w * k), 2 * (i * k + w * j)
-    R[1, 0], R[1, 1], R[1, 2] = 2 * (i * j + w * k), 1 - 2 * (i * i + k * k), 2 * (j * k - w * i)
-    R[2, 0], R[2, 1], R[2, 2] = 2 * (i * k - w * j), 2 * (j * k + w * i), 1 - 2 * (i * i + j * j)
-    V = np.empty((2, 3))
-    for col in range(3):
-        s = float(scale[col])
-        V[0, col] = (J[0, 0] * R[0, col] + J[0, 2] * R[2, col]) * s
-        V[1, col] = (J[1, 1] * R[1, col] + J[1, 2] * R[2, col]) * s
-    return V, J, R, q, u, v
+def _matrix(w, x, y, z):
+    """Rows of the rotation of a quaternion of any length."""
+    n = 2.0 / (w * w + x * x + y * y + z * z)
+    xx, yy, zz, xy, xz, yz, wx, wy, wz = x * x, y * y, z * z, x * y, x * z, y * z, w * x, w * y, w * z
+    return (
+        (1.0 - n * (yy + zz), n * (xy - wz), n * (xz + wy)),
+        (n * (xy + wz), 1.0 - n * (xx + zz), n * (yz - wx)),
+        (n * (xz - wy), n * (yz + wx), 1.0 - n * (xx + yy)),
+    )
 
 
 @njit(cache=True, error_model="numpy")
-def _turn_back(d_R, q, rotation, d_rotation):
-    """Gradient of the quaternion as stored, not yet of unit length, from that of its matrix."""
-    w, i, j, k = q
-    d = np.empty(4)
-    d[0] = 2 * (k * (d_R[1, 0] - d_R[0, 1]) + j * (d_R[0, 2] - d_R[2, 0]) + i * (d_R[2, 1] - d_R[1, 2]))
-    d[1] = 2 * (
-        j * (d_R[0, 1] + d_R[1, 0])
-        + k * (d_R[0, 2] + d_R[2, 0])
-        + w * (d_R[2, 1] - d_R[1, 2])
-        - 2 * i * (d_R[1, 1] + d_R[2, 2])
+def _turn(q, i, d_0, d_1, d_2):
+    """Gradient of the quaternion, of any length, from that of column i of its matrix.
+
+    The matrix is 1 + n B with n = 2/|q|^2 and B quadratic in q, so that d = n B' - (n^2 B) q.
+    """
+    w, x, y, z = q
+    n = 2.0 / (w * w + x * x + y * y + z * z)
+    if i == 0:
+        B = -(y * y + z * z) * d_0 + (x * y + w * z) * d_1 + (x * z - w * y) * d_2
+        d = z * d_1 - y * d_2, y * d_1 + z * d_2, -2 * y * d_0 + x * d_1 - w * d_2, -2 * z * d_0 + w * d_1 + x * d_2
+    elif i == 1:
+        B = (x * y - w * z) * d_0 - (x * x + z * z) * d_1 + (y * z + w * x) * d_2
+        d = x * d_2 - z * d_0, y * d_0 - 2 * x * d_1 + w * d_2, x * d_0 + z * d_2, -w * d_0 - 2 * z * d_1 + y * d_2
+    else:
+        B = (x * z + w * y) * d_0 + (y * z - w * x) * d_1 - (x * x + y * y) * d_2
+        d = y * d_0 - x * d_1, z * d_0 - w * d_1 - 2 * x * d_2, w * d_0 + z * d_1 - 2 * y * d_2, x * d_0 + y * d_1
+    shrink = n * n * B
+    return n * d[0] - shrink * w, n * d[1] - shrink * x, n * d[2] - shrink * y, n * d[3] - shrink * z
+
+
+@njit(cache=True, error_model="numpy")
+def _slope(u, v, fx, fy, cx, cy, width, height):
+    """x/z and y/z as the linearised projection uses them."""
+    u = min(max(u, -(cx + 0.15 * width) / fx), (width - cx + 0.15 * width) / fx)
+    return u, min(max(v, -(cy + 0.15 * height) / fy), (height - cy + 0.15 * height) / fy)
+
+
+@njit(cache=True, error_model="numpy")
+def _axes(R, S, u, v, j, k):
+    """The two rows of J R S."""
+    return (
+        (j * (R[0][0] - u * R[2][0]) * S[0], j * (R[0][1] - u * R[2][1]) * S[1], j * (R[0][2] - u * R[2][2]) * S[2]),
+        (k * (R[1][0] - v * R[2][0]) * S[0], k * (R[1][1] - v * R[2][1]) * S[1], k * (R[1][2] - v * R[2][2]) * S[2]),
     )
-    d[2] = 2 * (
-        i * (d_R[0, 1] + d_R[1, 0])
-        + k * (d_R[1, 2] + d_R[2, 1])
-        + w * (d_R[0, 2] - d_R[2, 0])
-        - 2 * j * (d_R[0, 0] + d_R[2, 2])
-    )
-    d[3] = 2 * (
-        i * (d_R[0, 2] + d_R[2, 0])
-        + j * (d_R[1, 2] + d_R[2, 1])
-        + w * (d_R[1, 0] - d_R[0, 1])
-        - 2 * k * (d_R[0, 0] + d_R[1, 1])
-    )
-    along = d[0] * w + d[1] * i + d[2] * j + d[3] * k
-    length = 0.0
-    for n in range(4):
-        length += float(rotation[n]) ** 2
-    length = math.sqrt(length)
-    for n in range(4):
-        d_rotation[n] = (d[n] - along * q[n]) / length
+
+
+@njit(cache=True, error_model="numpy")
+def _covariance(V0, V1):
+    """xx, xy, yy of J R S S^T R^T J^T + low pass [px^2]."""
+    a = V0[0] * V0[0] + V0[1] * V0[1] + V0[2] * V0[2] + LOW_PASS
+    c = V1[0] * V1[0] + V1[1] * V1[1] + V1[2] * V1[2] + LOW_PASS
+    return a, V0[0] * V1[0] + V0[1] * V1[1] + V0[2] * V1[2], c
