@@ -12,7 +12,7 @@ BLACK = 24
 def features(rgb: np.ndarray) -> np.ndarray:
     """Logarithms of red over green, green over blue, and brightest channel, (H, W, 3) float32.
 
-    Ratios do not change when a surface turns from the lamp: what tells blood-filled tissue from metal is red over green.
+    Ratios do not change when a surface turns from the lamp; red over green tells blood-filled tissue from metal.
     """
     level = cv2.GaussianBlur(rgb, (0, 0), 0.7).astype(np.float32) + OFFSET
     red, green, blue = level[..., 0], level[..., 1], level[..., 2]
@@ -22,7 +22,7 @@ def features(rgb: np.ndarray) -> np.ndarray:
 def lit(rgb: np.ndarray) -> np.ndarray:
     """Pixels inside the endoscope's picture: the connected surround that is black in every frame is not, (T, H, W)."""
     dark = (rgb.max((0, 3)) <= BLACK).astype(np.uint8)
-    count, label, stats, _ = cv2.connectedComponentsWithStats(dark, connectivity=4)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(dark, connectivity=4)
     height, width = dark.shape
     x, y, w, h = (stats[:, i] for i in range(4))
     outside = (x == 0) | (y == 0) | (x + w == width) | (y + h == height)

@@ -40,7 +40,8 @@ def tool(frames: Frames, given: Given, settings: Masking, progress) -> tuple[np.
     evidence = _shared_in_time(rgb, evidence, settings, progress)
     found = _regions(grey, evidence, inside)
     if settings.refine:
-        found = np.stack([snapped(frame, mask, band=max(rgb.shape[2] // 80, 2)) for frame, mask in zip(rgb, found)])
+        band = max(rgb.shape[2] // 80, 2)
+        found = np.stack([snapped(frame, mask, band=band) for frame, mask in zip(rgb, found, strict=True)])
         found = entering(np.stack([solid(m) for m in found]) & inside)
     return found, _confidence(evidence, found)
 

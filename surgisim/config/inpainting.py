@@ -1,0 +1,19 @@
+"""How the tissue behind the instrument is filled in."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from surgisim.config.base import Settings
+
+
+class Inpainting(Settings):
+    backend: str = "flow_copy"
+    """A file of surgisim/perception/inpainting: flow_copy, or network for what no frame saw [name]."""
+    margin: Annotated[int, Field(ge=0)] = 2
+    """How far around the instrument is filled in too, because its outline and its blur mix both [px]."""
+    reach: Annotated[int, Field(ge=1)] = 400
+    """Farthest frame a pixel may be copied from [frames]."""
+    weights: Path | None = None
+    """The network for the backend network, TorchScript (.pt) or ONNX (.onnx) [path]."""

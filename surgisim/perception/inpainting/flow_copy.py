@@ -1,0 +1,157 @@
+"""Fill what the instrument hides from frames that saw it, following the tissue; then invent the rest, once.
+
+Tissue hidden now was, or will be, seen: the motion of the tissue around the instrument is continued behind it
+and followed from frame to frame until the pixel is in view. Copies are lit like the rim of the hole they fill.
+What no frame ever saw is grown inward from the rim in one frame and carried from there to the others, so that it
+does not flicker.
+"""
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+
+from surgisim.artifacts.inpainted import COPIED, INVENTED, SEEN
+from surgisim.config.inpainting import Inpainting
+from surgisim.perception.flow import dense_flow
+from surgisim.perception.inpainting.smooth import continued
+from surgisim.perception.inpainting.source import Source, behind, followed, seen
+
+Invent = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def fill(rgb: np.ndarray, hole: np.ndarray, settings: Inpainting, progress) -> tuple[np.ndarray, np.ndarray]:
+    """Frames (T, H, W, 3) uint8 without their holes, and each pixel's origin (T, H, W) uint8."""
+    return fill_with(rgb, hole, settings, progress, invent=grown_inward)
+
+
+def fill_with(rgb, hole, settings: Inpainting, progress, *, invent: Invent) -> tuple[np.ndarray, np.ndarray]:
+    """As `fill`, with `invent(frame, hole) -> frame` for what no frame saw."""
+    total = len(rgb)
+    to_next, to_last = _tissue_motion(rgb, hole, progress)
+    earlier = _swept(range(total), to_last, hole)
+    later = _swept(range(total - 1, -1, -1), to_next, hole)
+    filled, known = rgb.copy(), ~hole
+    for t in range(total):
+        progress(total * (0.5 + 0.3 * t / total), total, "copying what other frames saw")
+        source = _nearer(earlier[t], later[t], t, settings.reach)
+        copied = hole[t] & source.found
+        filled[t][copied] = _lit_alike(rgb, hole, source, t, copied)
+        known[t] |= copied
+    origin = np.where(hole, np.where(known, COPIED, INVENTED), SEEN).astype(np.uint8)
+    _invent_into(filled, known, to_next, to_last, invent, progress)
+    return filled, origin
+
+
+def grown_inward(frame: np.ndarray, hole: np.ndarray) -> np.ndarray:
+    """Edge-aware fill: Telea, An image inpainting technique based on the fast marching method, 2004."""
+    return cv2.inpaint(frame, hole.astype(np.uint8), 5, cv2.INPAINT_TELEA)
+
+
+def _tissue_motion(rgb, hole, progress) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Flow of the tissue t -> t + 1 (last entry unused) and t -> t - 1 (first unused)."""
+    still = np.zeros((*rgb.shape[1:3], 2), np.float32)
+    to_next, to_last = [], [still]
+    for t in range(len(rgb) - 1):
+        progress(len(rgb) * 0.5 * t / len(rgb), len(rgb), "following the tissue")
+        there, back = dense_flow(rgb[t], rgb[t + 1]), dense_flow(rgb[t + 1], rgb[t])
+        to_next.append(behind(there, back, hole[t], hole[t + 1]))
+        to_last.append(behind(back, there, hole[t + 1], hole[t]))
+    return [*to_next, still], to_last
+
+
+def _swept(order, flow: list[np.ndarray], hole: np.ndarray) -> dict[int, Source]:
+    """Sources of each frame among the frames before it in `order`."""
+    sources: dict[int, Source] = {}
+    before: Source | None = None
+    for t in order:
+        before = seen(t, hole[t]) if before is None else followed(before, flow[t], t, hole[t])
+        sources[t] = before
+    return sources
+
+
+def _nearer(earlier: Source, later: Source, t: int, reach: int) -> Source:
+    """Of two sources the one fewer frames away, (none beyond `reach`)."""
+    away = [np.where(s.found & (abs(s.frame - t) <= reach), abs(s.frame - t), 1 << 20) for s in (earlier, later)]
+    second = away[1] < away[0]
+    frame = np.where(second, later.frame, earlier.frame)
+    frame = np.where(np.minimum(*away) >= 1 << 20, -1, frame)
+    return Source(frame, np.where(second[..., None], later.xy, earlier.xy))
+
+
+def _lit_alike(rgb, hole, source: Source, t: int, copied: np.ndarray) -> np.ndarray:
+    """Copied colours, corrected by what the rim of the hole would have been off by, (N, 3) uint8."""
+    colours = _looked_up(rgb, source, copied)
+    frame, xy = source.frame, source.xy
+    ring = cv2.dilate(copied.astype(np.uint8), np.ones((9, 9), np.uint8)).astype(bool) & ~hole[t]
+    if not ring.any():
+        return np.rint(colours).astype(np.uint8)
+    _, label = cv2.distanceTransformWithLabels(
+        (~copied).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    at = np.zeros((label.max() + 1, 2), int)
+    rows, columns = np.nonzero(copied)
+    at[label[rows, columns]] = np.stack([rows, columns], -1)
+    nearest = at[label]
+    y, x = nearest[..., 0], nearest[..., 1]
+    offset = np.stack([np.arange(hole.shape[2])[None] - x, np.arange(hole.shape[1])[:, None] - y], -1)
+    place = xy[y, x] + offset
+    height, width = hole.shape[1:]
+    inside = (place >= 0).all(-1) & (place[..., 0] <= width - 1) & (place[..., 1] <= height - 1)
+    ring &= inside & (frame[y, x] >= 0)
+    i, j = np.rint(place[..., 1]).astype(int).clip(0, height - 1), np.rint(place[..., 0]).astype(int).clip(0, width - 1)
+    ring &= ~hole[frame[y, x].clip(0), i, j]
+    if not ring.any():
+        return np.rint(colours).astype(np.uint8)
+    there = _looked_up(rgb, Source(frame[y, x], place.astype(np.float32)), ring)
+    off = np.zeros((height, width, 3), np.float32)
+    off[ring] = np.clip(rgb[t][ring] - there, -40, 40)
+    weight = ring.astype(np.float32)
+    mean = cv2.GaussianBlur(off, (0, 0), 3) / np.maximum(cv2.GaussianBlur(weight, (0, 0), 3), 1e-6)[..., None]
+    correction = continued(mean, ring)[copied]
+    return np.rint(np.clip(colours + correction, 0, 255)).astype(np.uint8)
+
+
+def _looked_up(rgb: np.ndarray, source: Source, chosen: np.ndarray) -> np.ndarray:
+    """Colour at the sources of the chosen pixels, interpolated, (N, 3) float32."""
+    colours = np.zeros((int(chosen.sum()), 3), np.float32)
+    frame, xy = source.frame[chosen], source.xy[chosen]
+    for s in np.unique(frame):
+        mine = frame == s
+        at = xy[mine]
+        sampled = cv2.remap(rgb[s].astype(np.float32), at[None, :, 0], at[None, :, 1], cv2.INTER_LINEAR)
+        colours[mine] = sampled[0]
+    return colours
+
+
+def _invent_into(filled, known, to_next, to_last, invent: Invent, progress) -> None:
+    """Fill what is left, beginning in the frame that lacks least and carrying that to both ends."""
+    total = len(filled)
+    lacking = (~known).sum((1, 2))
+    if not lacking.any():
+        return
+    first = int(np.argmax(lacking))
+    done = 0
+    for order, flow in ((range(first, total), to_last), (range(first - 1, -1, -1), to_next)):
+        for t in order:
+            done += 1
+            progress(total * (0.8 + 0.2 * done / total), total, "inventing what no frame saw")
+            gap = ~known[t]
+            if not gap.any():
+                continue
+            neighbour = t if t == first else (t - 1 if flow is to_last else t + 1)
+            if neighbour != t:
+                gap = _carried(filled, known, neighbour, t, flow[t], gap)
+            if gap.any():
+                filled[t] = np.where(gap[..., None], invent(filled[t], gap), filled[t])
+
+
+def _carried(filled, known, neighbour: int, t: int, flow: np.ndarray, gap: np.ndarray) -> np.ndarray:
+    """Take over what was invented in the neighbour; returns what it could not give."""
+    height, width = gap.shape
+    end = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1).astype(np.float32) + flow
+    inside = (end >= 0).all(-1) & (end[..., 0] <= width - 1) & (end[..., 1] <= height - 1)
+    taken = gap & inside
+    moved = cv2.remap(filled[neighbour], end[..., 0], end[..., 1], cv2.INTER_CUBIC)
+    filled[t][taken] = moved[taken]
+    return gap & ~taken
