@@ -7,6 +7,7 @@ from pathlib import Path
 ROOT = Path(workflow.basedir).parent
 sys.path.insert(0, str(ROOT))
 
+from surgisim.config.whole import PARENTS
 from surgisim.digest import digest
 from surgisim.plan import plan
 from surgisim.problem import Problem
@@ -62,6 +63,21 @@ def upstream(stage, name):
 def settings(stage):
     """Params function: the slice of the settings this stage may read, and nothing else."""
     return lambda w: PLAN.slices[stage, w.clip, w.variant]
+
+
+def products(rules):
+    """Every file of every clip and variant that runs, those that are shared once."""
+    # Not the reports alone: where a stage failed, what came after it still lies there from the time before,
+    # and Snakemake would take a missing file between up-to-date ends for one that nobody needs.
+    made = {
+        pattern.format(clip=clip, variant=PLAN.homes[stage, clip, variant])
+        for clip in PLAN.clips
+        for variant in PLAN.run
+        for stage in PARENTS
+        if stage != "phantom" or PLAN.clips[clip].path is None
+        for pattern in getattr(rules, stage).output
+    }
+    return sorted(made)
 
 
 @functools.cache
