@@ -65,12 +65,13 @@ def rooted(raw: dict[str, Any], folder: Path, kind: type[BaseModel] | None = Non
         wanted = field.annotation if field else None
         if isinstance(content, dict) and isinstance(wanted, type) and issubclass(wanted, BaseModel):
             result[key] = rooted(content, folder, wanted)
-        elif field and content and isinstance(content, str | Path) and _is_path(field):
+        elif field and content and isinstance(content, str | Path) and is_path(field):
             result[key] = str((folder / content).absolute())
     return result
 
 
-def _is_path(field: Any) -> bool:
+def is_path(field: Any) -> bool:
+    """Whether a setting names a file or a folder."""
     return Path in (field.annotation, *get_args(field.annotation)) or (field.description or "").endswith("[path]")
 
 

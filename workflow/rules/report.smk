@@ -50,9 +50,31 @@ rule evaluation:
 
 rule report:
     input:
-        metrics="results/{clip}/{variant}/evaluation/metrics.json",
+        frames=upstream("ingest", "frames.npz"),
+        camera=upstream("ingest", "camera.json"),
+        given=upstream("ingest", "given.npz"),
+        masks=upstream("masking", "masks.npz"),
+        inpainted=upstream("inpainting", "inpainted.npz"),
+        depth=upstream("depth", "depth.npz"),
+        tracks=upstream("tracking", "tracks.npz"),
+        motion=upstream("tracking", "motion.npz"),
+        scene=upstream("reconstruction", "scene.ply"),
+        deformation=upstream("reconstruction", "deformation.npz"),
+        rendered=upstream("reconstruction", "rendered.npz"),
+        body=upstream("thickening", "body.npz"),
+        material=upstream("estimation", "material.npz"),
+        physics=upstream("estimation", "physics.json"),
+        fit=upstream("estimation", "fit.json"),
+        replay=upstream("simulation", "replay.npz"),
+        metrics=upstream("evaluation", "metrics.json"),
+        truth=truth,
     output:
-        page="results/{clip}/{variant}/report/report.html",
+        report=report(
+            "results/{clip}/{variant}/report/report.html",
+            caption="../report/page.rst",
+            category="{clip}",
+            labels={"variant": "{variant}", "what": "everything"},
+        ),
     log:
         "logs/{clip}/{variant}/report.log",
     benchmark:
@@ -62,11 +84,17 @@ rule report:
     resources:
         mem_mb=3000,
     params:
+        truth=lambda w, input: f"--truth {input.truth}" if input.truth else "",
         settings=settings("report"),
         code=code("report"),
     shell:
         'python "$SURGISIM/stages/report.py"'
-        " --metrics {input.metrics} --report {output.page}"
+        " --frames {input.frames} --camera {input.camera} --given {input.given} --masks {input.masks}"
+        " --inpainted {input.inpainted} --depth {input.depth} --tracks {input.tracks}"
+        " --motion {input.motion} --scene {input.scene} --deformation {input.deformation}"
+        " --rendered {input.rendered} --body {input.body} --material {input.material}"
+        " --physics {input.physics} --fit {input.fit} --replay {input.replay}"
+        " --metrics {input.metrics} {params.truth} --report {output.report}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
