@@ -48,9 +48,9 @@ def observe(tracks: Tracks, motion: Motion, simulator: Simulator, *, floor: floa
     """
     rest = tracks.xyz[:, 0].astype(float)
     usable = np.isfinite(rest).all(1) & tracks.visible[:, 0]
-    carry = simulator.grid.matrix(np.where(usable[:, None], rest, simulator.rest[0]))[:, simulator.place]
+    carry = simulator.carry(np.where(usable[:, None], rest, simulator.rest[0]))
     support = np.asarray(carry.sum(1)).ravel()
-    usable &= support > 0.5
+    usable &= abs(support - 1) < 0.05
     for j in range(len(motion.radius)):
         usable &= np.linalg.norm(rest - motion.center_rest[j], axis=1) > motion.radius[j]
     if usable.sum() < 10:
@@ -58,7 +58,7 @@ def observe(tracks: Tracks, motion: Motion, simulator: Simulator, *, floor: floa
             f"tracks: only {int(usable.sum())} points lie on the body and outside the grip, but 10 are needed to fit "
             "its physics. Use a longer focal, a larger working size, or estimation.enabled: false."
         )
-    carry = sparse.diags(1 / np.maximum(support, 1e-9))[usable] @ carry
+    carry = carry[usable]
     moved = (tracks.xyz - tracks.xyz[:, :1])[usable].astype(float)
     seen = tracks.visible[usable] & np.isfinite(moved).all(-1)
     across, along = np.moveaxis(tracks.sigma_xyz[usable].astype(float), -1, 0)

@@ -24,8 +24,7 @@ def picture_loss(
 
     from surgisim.gaussians.rasterise import rasterise
 
-    carry = simulator.grid.matrix(scene.mean)[:, simulator.place]
-    carry = carry.multiply(1 / np.maximum(np.asarray(carry.sum(1)), 1e-9)).tocsr()
+    carry = simulator.carry(scene.mean)
     fixed = [
         torch.tensor(np.ascontiguousarray(a), dtype=torch.float32)
         for a in (scene.rotation, np.exp(scene.scale), 1 / (1 + np.exp(-scene.opacity)), scene.color)

@@ -76,22 +76,3 @@ class Grid:
         """Where the nodes are [m], (N, 3)."""
         axes = [self.origin[a] + self.spacing * np.arange(self.shape[a]) for a in range(3)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
-
-    def extended(self, displacement: np.ndarray, active: np.ndarray) -> np.ndarray:
-        """`displacement` (..., N, 3) with nodes that carry no mass filled from their neighbours.
-
-        A splat on the surface may lean on a node just outside the body; it then moves with the body.
-        """
-        from scipy.ndimage import convolve
-
-        known = active.reshape(self.shape).astype(float)
-        field = np.moveaxis(displacement, -2, 0).reshape(*self.shape, -1) * known[..., None]
-        box = np.ones((3, 3, 3))
-        for _ in range(2):
-            count = convolve(known, box, mode="constant")
-            mean = np.stack([convolve(c, box, mode="constant") for c in np.moveaxis(field, -1, 0)], -1)
-            new = (known == 0) & (count > 0)
-            field[new] = mean[new] / count[new][:, None]
-            known = known + new
-        flat = field.reshape(self.count, *displacement.shape[:-2], 3)
-        return np.moveaxis(flat, 0, -2)

@@ -4,8 +4,8 @@
     f_i = -sum_p V_p P(F_p, Fdot_p) dw_ip + sum_p w_ip b_p
     v_i <- v_i + dt (f_i / m_i + g),   u_i <- u_i + dt v_i             (symplectic Euler)
 
-b_p holds anchored particles (a grip, the base) to their path by a spring and a damper per unit of
-mass, so that the constraint acts on the interpolated motion of the driven volume itself and not on
+b_p holds anchored particles (a grip, the base) to their path by a spring per unit of mass,
+so that the constraint acts on the interpolated motion of the driven volume itself and not on
 whole nodes, which would widen it by up to a cell. Both passes only gather: every node sums over its
 own links in a fixed order, so results do not depend on the number of threads.
 
@@ -21,8 +21,6 @@ import warp as wp
 from surgisim.physics.catalogue import choose
 from surgisim.physics.fold import fold, gather, power
 
-LINKS = 27
-
 
 @wp.func
 def kinematics(
@@ -35,7 +33,7 @@ def kinematics(
 ):
     F = wp.identity(n=3, dtype=float)
     Fdot = wp.mat33()
-    for k in range(27):
+    for k in range(index.shape[1]):
         i = index[p, k]
         w = link[p, k]
         g = wp.vec3(w[1], w[2], w[3])
@@ -53,7 +51,7 @@ def carried(
     p: int,
 ):
     total = wp.vec3()
-    for k in range(27):
+    for k in range(index.shape[1]):
         total += link[p, k][0] * u[slot, index[p, k]]
     return total
 
@@ -66,8 +64,6 @@ class Anchors:
     path: wp.array2d(dtype=wp.vec3)
     active: wp.array2d(dtype=int)
     stiffness: float
-    damping: float
-    step: float
 
 
 @wp.kernel
@@ -91,8 +87,8 @@ def node_step(
     there = (n + 1) % slots
     force = wp.vec3()
     for e in range(start[i], start[i + 1]):
-        p = entry[e] / LINKS
-        w = link[p, entry[e] - p * LINKS]
+        p = entry[e] / link.shape[1]
+        w = link[p, entry[e] - p * link.shape[1]]
         force += w[0] * push[p] - stress[p] * wp.vec3(w[1], w[2], w[3])
     speed = v[here, i] + dt * (force / mass[i] + gravity)
     v[there, i] = speed
@@ -127,7 +123,6 @@ def node_adjoint_after(
     F_bar: wp.array(dtype=wp.mat33),
     Fdot_bar: wp.array(dtype=wp.mat33),
     x_bar: wp.array(dtype=wp.vec3),
-    xdot_bar: wp.array(dtype=wp.vec3),
     u_bar: wp.array(dtype=wp.vec3),
     v_bar: wp.array(dtype=wp.vec3),
 ):
@@ -135,11 +130,11 @@ def node_adjoint_after(
     du = wp.vec3()
     dv = wp.vec3()
     for e in range(start[i], start[i + 1]):
-        p = entry[e] / LINKS
-        w = link[p, entry[e] - p * LINKS]
+        p = entry[e] / link.shape[1]
+        w = link[p, entry[e] - p * link.shape[1]]
         g = wp.vec3(w[1], w[2], w[3])
         du += F_bar[p] * g + w[0] * x_bar[p]
-        dv += Fdot_bar[p] * g + w[0] * xdot_bar[p]
+        dv += Fdot_bar[p] * g
     u_bar[i] = u_bar[i] + du
     v_bar[i] = v_bar[i] + dv
 
@@ -184,17 +179,13 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
         if held > 0:
             n = clock[1]
             x = wp.vec3()
-            xdot = wp.vec3()
-            located = 0
+            located = int(0)
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.active[a, n] == 1:
                     if located == 0:
                         x = carried(u, index, link, slot, p)
-                        xdot = carried(v, index, link, slot, p)
                         located = 1
-                    to = anchors.path[a, n]
-                    speed = (anchors.path[a, n + 1] - to) / anchors.step
-                    force += anchors.stiffness * (to - x) + anchors.damping * (speed - xdot)
+                    force += anchors.stiffness * (anchors.path[a, n] - x)
         push[p] = weight[p] * force
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -213,7 +204,6 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
         F_bar: wp.array(dtype=wp.mat33),
         Fdot_bar: wp.array(dtype=wp.mat33),
         x_bar: wp.array(dtype=wp.vec3),
-        xdot_bar: wp.array(dtype=wp.vec3),
         theta_bar: wp.array2d(dtype=float),
     ):
         p = wp.tid()
@@ -221,7 +211,7 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
         F, Fdot = kinematics(u, v, index, link, slot, p)
         A = wp.mat33()
         b = wp.vec3()
-        for k in range(27):
+        for k in range(index.shape[1]):
             w = link[p, k]
             f = f_bar[index[p, k]]
             A -= wp.outer(f, wp.vec3(w[1], w[2], w[3]))
@@ -233,12 +223,11 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
         for m in range(wp.static(columns)):
             theta_bar[p, m] = theta_bar[p, m] + dtheta[m]
         held = anchors.member[p]
-        spring = 0.0
+        spring = float(0.0)
         if held > 0:
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.active[a, clock[1]] == 1:
                     spring += weight[p]
         x_bar[p] = (-anchors.stiffness * spring) * b
-        xdot_bar[p] = (-anchors.damping * spring) * b
 
     return SimpleNamespace(step=step, adjoint=adjoint, columns=columns)

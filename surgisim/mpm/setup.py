@@ -8,6 +8,7 @@ import numpy as np
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.material import Material
 from surgisim.artifacts.physics import Physics
+from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.simulator import Simulator
 from surgisim.mpm.stable import check_step, largest_step, wave_speed
@@ -45,6 +46,7 @@ def prepare(
     density: float,
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     carried: np.ndarray | None = None,
+    cut: Cut | None = None,
     device: str = "cpu",
 ) -> Prepared:
     """Lay the grid around the body and every further rest point it has to carry [m], (Q, 3)."""
@@ -57,6 +59,7 @@ def prepare(
         terms=terms,
         wave_speed=wave_speed(choose(terms), values, density),
         gravity=gravity,
+        cut=cut,
         device=device,
     )
     return Prepared(simulator, tuple(terms), density)

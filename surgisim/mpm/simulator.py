@@ -10,7 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
+from scipy import sparse
 
+from surgisim.mpm.cut import Cut
+from surgisim.mpm.extension import extension
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.kernels import Anchors, node_adjoint_after, node_adjoint_before, node_step, particle_kernels, tick
@@ -19,9 +22,8 @@ from surgisim.problem import Problem
 wp.config.quiet = True
 
 ANCHOR_STIFFNESS = 4.0
-"""Spring of an anchor, in units of (wave speed / spacing)^2 per unit of mass."""
-ANCHOR_DAMPING = 0.3
-"""Share of critical damping of that spring."""
+"""Spring of an anchor, in units of (wave speed / spacing)^2 per unit of mass. It has no damper: at the
+held boundary that would drain every wave that arrives there."""
 
 NEVER = 2**31 - 1
 
@@ -35,7 +37,7 @@ class Run:
     """What a forward run leaves: enough to draw it, to judge it and to walk it back."""
 
     u: np.ndarray
-    """Nodal displacement at every frame [m], (T, A, 3) float32, over active nodes."""
+    """Nodal displacement at every frame [m], (T, A, 3) float32, over solid nodes."""
     v: np.ndarray
     """Nodal velocity at every frame [m/s], (T, A, 3) float32."""
 
@@ -53,33 +55,29 @@ class Simulator:
         terms: tuple[str, ...],
         wave_speed: float,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        cut: Cut | None = None,
         device: str = "cpu",
     ) -> None:
         """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,); `wave_speed` [m/s] sets the anchors' spring."""
         self.rest, self.grid, self.terms, self.device = np.asarray(rest, float), grid, tuple(terms), device
-        self.count = len(rest)
-        nodes, weight, gradient = grid.stencil(rest)
+        self.count, self.cut = len(rest), cut
+        nodes, weight, _ = self.stencil(self.rest)
         mass_p = volume.astype(float) * density
-        mass = np.bincount(nodes.ravel(), (weight * mass_p[:, None]).ravel(), grid.count)
-        # Nodes that a particle reaches with a vanishing weight carry no physics, only rounding.
-        self.active = mass > 1e-7 * mass.max()
-        self.place = np.flatnonzero(self.active)
-        renumber = np.full(grid.count, -1, np.int32)
-        renumber[self.place] = np.arange(len(self.place), dtype=np.int32)
-        local = renumber[nodes]
-        links = np.concatenate([weight[..., None], gradient], -1).astype(np.float32)
-        links[local < 0] = 0.0
-        local[local < 0] = 0
+        sides = 1 if cut is None else 2
+        mass = np.bincount(nodes.ravel(), (weight * mass_p[:, None]).ravel(), sides * grid.count)
+        self.place, self.rule = extension(grid, mass, cut)
+        local, links = self.links(self.rest)
+        mass = np.bincount(local.ravel(), (links[..., 0] * mass_p[:, None]).ravel(), len(self.place))
         order = np.argsort(local.ravel(), kind="stable").astype(np.int32)
         start = np.searchsorted(local.ravel()[order], np.arange(len(self.place) + 1)).astype(np.int32)
 
         def put(array, dtype):
             return wp.array(np.ascontiguousarray(array), dtype=dtype, device=device)
 
-        self.index, self.link = put(local, int), put(links, wp.vec4)
+        self.index, self.link = put(local, int), put(links.astype(np.float32), wp.vec4)
         self.start, self.entry = put(start, int), put(order, int)
         self.volume, self.mass_p = put(volume.astype(np.float32), float), put(mass_p.astype(np.float32), float)
-        self.mass = put(mass[self.place].astype(np.float32), float)
+        self.mass = put(mass.astype(np.float32), float)
         self.gravity = wp.vec3(*gravity)
         self.stress = wp.zeros(self.count, dtype=wp.mat33, device=device)
         self.push = wp.zeros(self.count, dtype=wp.vec3, device=device)
@@ -88,7 +86,6 @@ class Simulator:
         self.kernels = particle_kernels(self.terms)
         rate = wave_speed / grid.spacing
         self.stiffness = ANCHOR_STIFFNESS * rate**2
-        self.damping = 2 * ANCHOR_DAMPING * np.sqrt(self.stiffness)
 
     # Forward
 
@@ -102,7 +99,7 @@ class Simulator:
         last: int | None = None,
         progress: Callable[[float, float, str], None] | None = None,
     ) -> Run:
-        """Frames `first` to `last` of the drive, from state `begin` (u, v over active nodes; rest if None).
+        """Frames `first` to `last` of the drive, from state `begin` (u, v over solid nodes; rest if None).
 
         theta: parameters, one row a particle, (P, M). Raises Problem where a particle inverts or a
         number stops being finite, naming step and particle.
@@ -158,13 +155,57 @@ class Simulator:
             ub.assign(total.astype(np.float32))
         return theta_bar.numpy().astype(float)
 
-    # Parts
+    def stencil(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As Grid.stencil; a link across the cut leads to the node's copy on the point's own side, N further on."""
+        nodes, weight, gradient = self.grid.stencil(points)
+        if self.cut is not None:
+            across = self.cut.crosses(points[:, None], self.grid.positions()[nodes])
+            nodes = nodes + across.astype(np.int32) * self.grid.count
+        return nodes, weight, gradient
+
+    def links(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Solid nodes (Q, L) that carry points [m], (Q, 3), with weight and its gradient [1, 1/m], (Q, L, 4).
+
+        Rows shorter than the longest are padded with links of weight zero to their first node.
+        """
+        nodes, weight, gradient = self.stencil(points)
+        rows = np.repeat(np.arange(len(nodes)), 27)
+        size = (len(nodes), self.rule.shape[0])
+        parts = [
+            (sparse.csr_matrix((values.ravel(), (rows, nodes.ravel())), size) @ self.rule).tocsr()
+            for values in (weight, *np.moveaxis(gradient, -1, 0))
+        ]
+        # One pattern for the four: where one of them happens to be zero, the others need not be.
+        pattern = sum(abs(p) for p in parts).tocsr()
+        pattern.sort_indices()
+        lengths = np.diff(pattern.indptr)
+        row = np.repeat(np.arange(len(nodes)), lengths)
+        column = np.arange(pattern.nnz) - np.repeat(pattern.indptr[:-1], lengths)
+        index = np.zeros((len(nodes), max(1, int(lengths.max(initial=1)))), np.int32)
+        first = np.where(lengths > 0, pattern.indices[np.minimum(pattern.indptr[:-1], max(pattern.nnz - 1, 0))], 0)
+        index[:] = first[:, None]
+        index[row, column] = pattern.indices
+        link = np.zeros((*index.shape, 4))
+        for k, part in enumerate(parts):
+            link[row, column, k] = np.asarray(part[row, pattern.indices]).ravel()
+        return index, link
+
+    def carry(self, points: np.ndarray) -> sparse.csr_matrix:
+        """Interpolation from solid nodes to points [m], (Q, 3), (Q, A); rows far from the body sum to less than 1."""
+        index, link = self.links(points)
+        rows = np.repeat(np.arange(len(index)), index.shape[1])
+        return sparse.csr_matrix((link[..., 0].ravel(), (rows, index.ravel())), (len(index), len(self.place)))
 
     def displaced(self, u: np.ndarray) -> np.ndarray:
-        """Full-grid nodal displacement [m], (..., N, 3), extended to nodes just outside the body."""
-        full = np.zeros((*u.shape[:-2], self.grid.count, 3))
-        full[..., self.place, :] = u
-        return self.grid.extended(full, self.active)
+        """Nodal displacement [m], (..., N, 3) or (..., 2 N, 3) once cut, of every node that follows the body."""
+        flat = np.moveaxis(u.astype(float), -2, 0).reshape(len(self.place), -1)
+        return np.moveaxis((self.rule @ flat).reshape(-1, *u.shape[:-2], 3), 0, -2)
+
+    def inherited(self, other: "Simulator", u: np.ndarray) -> np.ndarray:
+        """Nodal values of `other`, (A', 3), over this simulator's nodes, (A, 3): both copies start as the node did."""
+        return other.displaced(u)[self.place % self.grid.count].astype(np.float32)
+
+    # Parts
 
     def _slots(self, count: int):
         shape = (count, len(self.place))
@@ -181,7 +222,7 @@ class Simulator:
         anchors.member = wp.array(drive.member.astype(np.int32), dtype=int, device=self.device)
         anchors.path = wp.array(drive.path.astype(np.float32), dtype=wp.vec3, device=self.device)
         anchors.active = wp.array(drive.active.astype(np.int32), dtype=int, device=self.device)
-        anchors.stiffness, anchors.damping, anchors.step = float(self.stiffness), float(self.damping), drive.step
+        anchors.stiffness = float(self.stiffness)
         return anchors
 
     def _reset(self, step: int) -> None:
@@ -201,17 +242,17 @@ class Simulator:
         ]
 
     def _adjoint_commands(self, theta, anchors, dt, slots, u, v, ub, vb, theta_bar):
-        fb, xb, sb = (wp.zeros(n, dtype=wp.vec3, device=self.device) for n in (len(self.place), self.count, self.count))
+        fb, xb = (wp.zeros(n, dtype=wp.vec3, device=self.device) for n in (len(self.place), self.count))
         Fb, Gb = (wp.zeros(self.count, dtype=wp.mat33, device=self.device) for _ in range(2))
         launch = {"device": self.device, "record_cmd": True}
         return [
             wp.launch(tick, 1, [self.clock, -1], **launch),
             wp.launch(node_adjoint_before, len(self.place), [self.mass, dt, ub, vb, fb], **launch),
-            self._particles(self.kernels.adjoint, theta, anchors, slots, u, v, [fb, Fb, Gb, xb, sb, theta_bar]),
+            self._particles(self.kernels.adjoint, theta, anchors, slots, u, v, [fb, Fb, Gb, xb, theta_bar]),
             wp.launch(
                 node_adjoint_after,
                 len(self.place),
-                [self.start, self.entry, self.link, Fb, Gb, xb, sb, ub, vb],
+                [self.start, self.entry, self.link, Fb, Gb, xb, ub, vb],
                 **launch,
             ),
         ]

@@ -1,0 +1,22 @@
+"""Settings of a simulation."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from surgisim.config.base import Settings
+
+
+class Simulation(Settings):
+    """How a replay or a new operation is run and drawn."""
+
+    operation: dict | None = None
+    """A new operation (docs/operations.md); null replays the recorded one [-]."""
+    render: bool = True
+    """Whether to draw the frames [-]."""
+    interior: bool = True
+    """Whether to draw the thickened interior behind the surface, so that an opened cut shows tissue [-]."""
+    refine_step: int = Field(1, ge=1, le=100)
+    """Divide the step that travels with the parameters by this, to see that the answer does not depend on it [-]."""
+    device: Literal["cpu", "cuda"] = "cpu"
+    """Where the simulation runs [-]."""

@@ -1,0 +1,1 @@
+"""New manipulations of the body, and pictures of them."""

@@ -1,0 +1,138 @@
+"""Run the recorded manipulation, or a new one, on a fitted body."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from surgisim.artifacts.body import Body
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.material import Material
+from surgisim.artifacts.motion import Motion
+from surgisim.artifacts.physics import Physics
+from surgisim.artifacts.replay import Replay
+from surgisim.artifacts.scene import Scene
+from surgisim.config.simulation import Simulation
+from surgisim.mpm.grip import Drive, drive
+from surgisim.mpm.setup import checked_per_frame, prepare, theta_of, values_of
+from surgisim.mpm.simulator import Run, Simulator
+from surgisim.physics.catalogue import choose
+from surgisim.problem import Problem
+from surgisim.simulation.operation import Plan, plan
+
+
+def replay(
+    body: Body,
+    scene: Scene,
+    material: Material,
+    physics: Physics,
+    motion: Motion,
+    camera: Camera,
+    settings: Simulation,
+    progress: Callable[[float, float, str], None],
+) -> Replay:
+    """The body at every frame of the recorded motion, or of `settings.operation`."""
+    if not np.isclose(physics.grid["spacing"], body.spacing, rtol=1e-4):
+        raise Problem(
+            f"physics.json was fitted on a grid of {physics.grid['spacing']:.6f} m, but body.npz is made for "
+            f"{body.spacing:.6f} m. Fit again, or pass the body that was fitted."
+        )
+    theta = theta_of(physics, material)
+    if len(theta) != len(body.rest):
+        raise Problem(f"material.npz has {len(theta)} particles, but body.npz has {len(body.rest)}. Pass a pair.")
+    task = (
+        Plan(motion, np.zeros((camera.frames, 3)), None, 0)
+        if settings.operation is None
+        else plan(settings.operation, body.rest, body.surface, camera, body.spacing)
+    )
+    per_frame = checked_per_frame(physics, material, camera.fps) * settings.refine_step
+    path = drive(task.motion, body.rest, body.held, fps=camera.fps, per_frame=per_frame, frames=len(task.base))
+    clock = np.arange(path.steps + 1) / per_frame
+    path.path[0] = np.stack([np.interp(clock, np.arange(len(task.base)), task.base[:, a]) for a in range(3)], -1)
+    parts = _parts(body, scene, physics, task, settings.device)
+    states, whole = _march(parts, theta, path, task, lambda d, t, s: progress(0.5 * d, t, s))
+    frames = len(path.path[0]) // per_frame + 1
+    position, nodes, smallest, energy, rgb = [], [], [], [], []
+    looks = {}
+    for t in range(frames):
+        simulator, run, k = states[t]
+        key = id(simulator)
+        if key not in looks:
+            looks[key] = _Look(simulator, body, scene, settings, physics, theta)
+        full = simulator.displaced(run.u[k])
+        moved, least, joules = looks[key].measure(full, run.v[k])
+        position.append(moved.astype(np.float32))
+        nodes.append(full[: simulator.grid.count].astype(np.float32))
+        smallest.append(least)
+        energy.append(joules)
+        if settings.render:
+            rgb.append(looks[key].drawn.picture(full, camera))
+        progress(0.5 + 0.5 * (t + 1) / frames, 1.0, f"drawing frame {t + 1}/{frames}")
+    grid = whole.grid
+    picture = np.stack(rgb) if rgb else np.zeros((0, camera.height, camera.width, 3), np.uint8)
+    return Replay(
+        time=np.arange(frames) / camera.fps,
+        position=np.stack(position),
+        nodes=np.stack(nodes),
+        origin=grid.origin,
+        shape=grid.shape,
+        spacing=grid.spacing,
+        smallest_volume_ratio=np.array(smallest),
+        energy=np.array(energy),
+        rgb=picture,
+    )
+
+
+def _parts(body: Body, scene: Scene, physics: Physics, task: Plan, device: str) -> list[Simulator]:
+    """The whole body and, when something is cut, the cut one."""
+    make = [None] if task.cut is None else [None, task.cut]
+    return [
+        prepare(
+            body, tuple(physics.terms), values_of(physics), density=physics.density, gravity=tuple(physics.gravity),
+            carried=scene.mean.astype(float), cut=cut, device=device,
+        ).simulator
+        for cut in make
+    ]  # fmt: skip
+
+
+def _march(parts: list[Simulator], theta, path: Drive, task: Plan, progress):
+    """For every frame: simulator, run, and the frame's place in it."""
+    whole, last = parts[0], path.frames - 1
+    switch = task.cut_frame if task.cut is not None else last
+    states: dict[int, tuple[Simulator, Run, int]] = {}
+    run = whole.run(theta, path, first=0, last=switch, progress=progress)
+    states |= {t: (whole, run, t) for t in range(switch + 1)}
+    if task.cut is not None and switch < last:
+        opened = parts[1]
+        begin = tuple(opened.inherited(whole, a[-1]) for a in (run.u, run.v))
+        run = opened.run(theta, path, begin=begin, first=switch, last=last, progress=progress)
+        states |= {switch + k: (opened, run, k) for k in range(1, last - switch + 1)}
+    return states, whole
+
+
+class _Look:
+    """What is read off a state: particles, det F, energy, and the splats to draw."""
+
+    def __init__(self, simulator: Simulator, body: Body, scene: Scene, settings: Simulation, physics: Physics, theta):
+        self.simulator, self.body = simulator, body
+        self.nodes, self.weight, self.gradient = simulator.stencil(body.rest.astype(float))
+        self.mass = simulator.mass.numpy()
+        self.laws = []
+        column = 0
+        for term in choose(physics.terms).values():
+            values = {p: theta[:, column + k] for k, p in enumerate(term.params)}
+            column += len(term.params)
+            if term.energy:
+                self.laws.append((term.energy, values))
+        if settings.render:
+            from surgisim.simulation.draw import Drawn
+
+            self.drawn = Drawn(scene, body, simulator, settings.interior)
+
+    def measure(self, full: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, float, tuple[float, float]]:
+        """Particle positions [m], (P, 3); smallest det F; kinetic and elastic energy [J]."""
+        u = full[self.nodes]
+        moved = self.body.rest + np.einsum("pk,pka->pa", self.weight, u)
+        F = np.eye(3) + np.einsum("pka,pkb->pab", u, self.gradient)
+        kinetic = 0.5 * float((self.mass * (v.astype(float) ** 2).sum(-1)).sum())
+        elastic = sum(float((e(F, **values) * self.body.volume).sum()) for e, values in self.laws)
+        return moved, float(np.linalg.det(F).min()), (kinetic, elastic)
