@@ -1,0 +1,95 @@
+"""The CUDA engine: gsplat behind the interface of `rasterise`.
+
+Ye et al., gsplat: an open-source library for Gaussian splatting, JMLR 26 (2025). It differs from the other engines
+in three small ways: pixel centres lie at halves (shifted here), alpha is held at 0.999 instead of 0.99, and the
+Gaussian that would bring T below 1e-4 is left out. It builds its kernels with nvcc when first used (minutes).
+"""
+
+import importlib.util
+import shutil
+
+import torch
+
+from surgisim.artifacts.camera import Camera
+from surgisim.gaussians.projection import LOW_PASS
+from surgisim.problem import Problem
+
+
+def rasterise(
+    mean: torch.Tensor,
+    rotation: torch.Tensor,
+    scale: torch.Tensor,
+    opacity: torch.Tensor,
+    color: torch.Tensor,
+    probe: torch.Tensor,
+    camera: Camera,
+    background: tuple[float, ...],
+    near: float,
+) -> tuple[torch.Tensor, ...]:
+    """rgb, depth, alpha, weight; see surgisim.gaussians.rasterise."""
+    missing = lacking()
+    if missing:
+        raise Problem(f"rasterise: engine gsplat needs {missing}, which this machine lacks. Use engine numba.")
+    for tensor in (mean, rotation, scale, opacity, color):
+        if tensor.dtype != torch.float32 or tensor.device.type != "cuda":
+            raise Problem(
+                f"rasterise: engine gsplat wants float32 on a CUDA device and was given {tensor.dtype} on "
+                f"{tensor.device}."
+            )
+    attributes = mean, rotation, scale, opacity
+    image, alpha, facts = _draw(*attributes, color, camera, background, near, "RGB+D")
+    if probe.requires_grad and facts["means2d"].requires_grad:
+        facts["means2d"].register_hook(lambda gradient: _add_gradient(probe, gradient.reshape(-1, 2)))
+    return image[..., :3], image[..., 3], alpha, _weight(*attributes, camera, near)
+
+
+def lacking() -> str:
+    """What the engine misses on this machine, in words; empty when it can run."""
+    if not torch.cuda.is_available():
+        return "a CUDA device"
+    if importlib.util.find_spec("gsplat") is None:
+        return "the package gsplat (surgisim's extra 'cuda')"
+    from torch.utils.cpp_extension import CUDA_HOME
+
+    built = importlib.util.find_spec("gsplat.csrc") is not None
+    if not built and CUDA_HOME is None and shutil.which("nvcc") is None:
+        return "nvcc, the CUDA compiler that gsplat builds its kernels with"
+    return ""
+
+
+def _draw(mean, rotation, scale, opacity, color, camera, background, near, mode):
+    from gsplat import rasterization
+
+    lens = mean.new_tensor(camera.matrix)
+    lens[:2, 2] += 0.5
+    image, alpha, facts = rasterization(
+        mean,
+        rotation,
+        scale,
+        opacity,
+        color,
+        torch.eye(4, device=mean.device)[None],
+        lens[None],
+        camera.width,
+        camera.height,
+        near_plane=near,
+        eps2d=LOW_PASS,
+        packed=False,
+        backgrounds=mean.new_tensor(background)[None],
+        render_mode=mode,
+    )
+    return image[0], alpha[0, ..., 0], facts
+
+
+def _weight(mean, rotation, scale, opacity, camera, near):
+    """Sum of w over all pixels: the gradient of a picture of ones with respect to their colour."""
+    with torch.enable_grad():
+        one = torch.ones_like(mean[:, :1], requires_grad=True)
+        fixed = (t.detach() for t in (mean, rotation, scale, opacity))
+        image, _, _ = _draw(*fixed, one, camera, (0.0,), near, "RGB")
+        (weight,) = torch.autograd.grad(image.sum(), one)
+    return weight[:, 0]
+
+
+def _add_gradient(probe, gradient):
+    probe.grad = gradient.clone() if probe.grad is None else probe.grad + gradient

@@ -1,0 +1,98 @@
+"""The regularisers and which points count as neighbours."""
+
+import numpy as np
+import pytest
+import torch
+
+from surgisim.gaussians.losses import anisotropic, masked_l1, total_variation, trajectory
+from surgisim.gaussians.neighbours import groups, nearest
+from surgisim.problem import Problem
+
+rng = np.random.default_rng(4)
+POINTS = rng.random((40, 3))
+STEP = torch.tensor(rng.standard_normal((40, 3)))
+SCALE = torch.tensor(np.exp(rng.standard_normal((40, 3))))
+GROUPS = torch.tensor(groups(POINTS, 5))
+
+
+def test_round_small_gaussians_cost_nothing():
+    assert float(anisotropic(torch.full((5, 3), 0.01), unit=0.01)) == 0
+    assert float(anisotropic(torch.tensor([[0.01, 0.003, 0.0034]]), unit=0.01, r_ani=3.34)) == 0
+
+
+def test_what_is_too_large_or_too_thin_costs_its_excess():
+    assert float(anisotropic(torch.tensor([[0.5, 0.5, 0.2]], dtype=torch.float64), unit=0.1)) == pytest.approx(4)
+    thin = torch.tensor([[0.5, 0.1, 0.2]], dtype=torch.float64)
+    assert float(anisotropic(thin, unit=1.0)) == pytest.approx(2)
+    assert float(anisotropic(thin, unit=0.1, r_m=2.0)) == pytest.approx(3 + 2)
+
+
+def test_the_trajectory_term_is_the_sum_over_all_pairs():
+    pairs = [(STEP[j], STEP[k]) for group in GROUPS for j in group for k in group]
+    apart = sum((a - b).square().sum() for a, b in pairs) / len(pairs)
+    along = sum(a @ b for a, b in pairs) / len(pairs)
+    assert torch.allclose(trajectory(STEP, GROUPS), apart)
+    assert torch.allclose(trajectory(STEP, GROUPS, literal=True), along)
+
+
+def test_moving_alike_is_free_and_moving_apart_is_not():
+    alike, apart = torch.ones(2, 3), torch.tensor([[1.0, 0, 0], [-1, 0, 0]])
+    pair = torch.tensor([[0, 1]])
+    assert float(trajectory(alike, pair)) == 0
+    assert float(trajectory(apart, pair)) == pytest.approx(2)
+
+
+def test_the_printed_trajectory_term_has_it_the_other_way_round():
+    alike, apart = torch.ones(2, 3), torch.tensor([[1.0, 0, 0], [-1, 0, 0]])
+    pair = torch.tensor([[0, 1]])
+    assert float(trajectory(alike, pair, literal=True)) == pytest.approx(3)
+    assert float(trajectory(apart, pair, literal=True)) == 0
+
+
+def test_total_variation_is_the_mean_jump():
+    value = torch.tensor([0.0, 1.0, 3.0])
+    assert float(total_variation(value, torch.tensor([[1], [0], [1]]))) == pytest.approx((1 + 1 + 2) / 3)
+    assert float(total_variation(torch.ones(3, 2), torch.tensor([[1], [2], [0]]))) == 0
+
+
+def test_the_picture_counts_only_under_the_mask():
+    value, target = torch.zeros(2, 2, 3), torch.ones(2, 2, 3)
+    target[0, 0] = 5
+    assert float(masked_l1(value, target, torch.tensor([[False, True], [True, True]]))) == 1
+    assert float(masked_l1(value[..., 0], target[..., 0], torch.tensor([[True, False], [False, False]]))) == 5
+    assert float(masked_l1(value, target, torch.zeros(2, 2, dtype=torch.bool))) == 0
+
+
+@pytest.mark.parametrize(
+    "loss",
+    [
+        lambda v: anisotropic(v.exp(), unit=0.5),
+        lambda v: trajectory(v, GROUPS),
+        lambda v: trajectory(v, GROUPS, literal=True),
+        lambda v: total_variation(v, GROUPS[:, 1:]),
+        lambda v: masked_l1(v.reshape(5, 8, 3), torch.zeros(5, 8, 3), torch.ones(5, 8)),
+    ],
+    ids=["anisotropic", "trajectory", "literal", "total variation", "masked l1"],
+)
+def test_gradients_are_central_differences(loss):
+    assert torch.autograd.gradcheck(loss, STEP.clone().requires_grad_())
+
+
+def test_neighbours_are_the_nearest_others():
+    far = np.linalg.norm(POINTS[:, None] - POINTS, axis=2)
+    np.fill_diagonal(far, np.inf)
+    assert np.array_equal(nearest(POINTS, 5), np.argsort(far, 1)[:, :5])
+    assert np.array_equal(groups(POINTS, 5)[:, 0], np.arange(40))
+
+
+def test_points_at_one_place_are_each_others_neighbours_and_never_their_own():
+    found = nearest(np.zeros((6, 3)), 3)
+    assert not (found == np.arange(6)[:, None]).any()
+    assert all(len(set(row)) == 3 for row in found)
+    assert np.array_equal(found, nearest(np.zeros((6, 3)), 3))
+
+
+@pytest.mark.parametrize("k", [0, 4])
+def test_more_neighbours_than_there_are_points_are_refused(k):
+    with pytest.raises(Problem, match=rf"{k} neighbours are wanted for each of 4 points"):
+        nearest(np.eye(4, 3), k)
