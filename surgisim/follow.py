@@ -55,5 +55,4 @@ def _line(job: Job, state: State) -> Text:
 
 
 def _count(done: int, state: State) -> str:
-    # The last job is `all`, which does nothing.
-    return f"{done:3d}/{max(state.total - 1, done)}"
+    return f"{done:3d}/{max(state.total, done)}"

@@ -134,7 +134,8 @@ def _hear(line: str, state: State, out: Path, debug: bool) -> None:
     event = said["event"]
     key = str(said.get("jobid", said.get("job_id")))
     if event == "run_info":
-        state.total = max(state.total, said["stats"].get("total", 0))
+        stats = said["stats"]
+        state.total = max(state.total, stats.get("total", 0) - stats.get("all", 0))
     elif event == "job_info":
         log = out / said["log"][0] if said["log"] else Path(os.devnull)
         state.jobs[key] = Job(said["rule_name"], said["wildcards"] or {}, log, time.monotonic())

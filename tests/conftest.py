@@ -1,0 +1,15 @@
+"""What tests of several rooms use."""
+
+from pathlib import Path
+
+import pytest
+
+SHARED = Path(__file__).parents[2] / "shared"
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """Recordings and weights beside the project; a test that needs them is skipped where they are not."""
+    if not SHARED.is_dir():
+        pytest.skip(f"NO SHARED DATA: {SHARED} is not there, so this test did not run.")
+    return SHARED

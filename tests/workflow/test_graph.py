@@ -1,0 +1,153 @@
+"""What runs, what is shared, and what an edit starts again."""
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from surgisim.config.whole import PARENTS
+
+ROOT = Path(__file__).parents[2]
+VARIANTS = list(yaml.safe_load((ROOT / "config" / "variants.yaml").read_text()))
+STAGES = set(PARENTS) | {"summary"}
+
+
+def below(*stages: str) -> set[str]:
+    """The stages, and all that come after them."""
+    reached = set(stages)
+    for stage, parents in PARENTS.items():
+        if reached & set(parents):
+            reached.add(stage)
+    return reached | {"summary"}
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_every_variant_has_a_complete_graph(tree, variant):
+    tree.choices = {"run": [variant]}
+    assert tree.rules() == STAGES
+
+
+def test_variants_share_what_they_do_not_change(tree):
+    tree.choices = {"run": VARIANTS}
+    made = {}
+    for stage, *where in tree.plan():
+        made.setdefault(stage, set()).add(where[-1] if where else "")
+    assert made["masking"] == made["depth"] == made["tracking"] == {"main"}
+    assert made["reconstruction"] == {"main", "no_trajectory", "no_anisotropy", "no_both"}
+    assert made["estimation"] == set(VARIANTS)
+    assert made["evaluation"] == made["report"] == set(VARIANTS)
+
+
+def test_two_clips_with_all_variants_run_in_one_call(tree):
+    (tree.root / "config" / "clips.tsv").write_text("name\tpath\none\tphantom\ntwo\tphantom\n")
+    tree.choices = {"run": VARIANTS}
+    assert tree.run() == 0
+    assert len(list(tree.out.glob("results/*/*/report/report.html"))) == 2 * len(VARIANTS)
+    assert not tree.plan()
+
+
+def test_a_hundred_clips_are_planned(tree):
+    rows = "".join(f"clip{i}\tphantom\t{100 + i}\n" for i in range(100))
+    (tree.root / "config" / "clips.tsv").write_text("name\tpath\tfocal\n" + rows)
+    assert len(tree.plan()) == 100 * len(PARENTS) + 1
+
+
+def test_nothing_runs_twice(finished):
+    assert not finished.plan()
+
+
+def test_touching_the_library_runs_nothing(finished):
+    later = time.time() + 60
+    for path in (finished.root / "surgisim").rglob("*.py"):
+        os.utime(path, (later, later))
+    assert not finished.plan()
+
+
+@pytest.mark.parametrize(
+    ("edited", "users"),
+    [
+        ("surgisim/perception/masking/colour_motion.py", {"masking"}),
+        ("surgisim/config/depth.py", {"depth"}),
+        ("surgisim/report/style.css", {"report"}),
+        ("surgisim/physics/terms/newtonian.py", {"estimation", "simulation"}),
+        ("surgisim/stage.py", STAGES),
+        ("surgisim/doctor.py", None),
+    ],
+)
+def test_an_edit_runs_exactly_the_stages_that_use_the_file(finished, edited, users):
+    text = (finished.root / edited).read_text()
+    finished.edit(edited, "\n/* */\n" if edited.endswith(".css") else "\n# edited\n")
+    try:
+        wanted = set() if users is None else below(*users)
+        assert finished.rules() - {"summary"} == wanted - {"summary"}
+    finally:
+        (finished.root / edited).write_text(text)
+
+
+def test_a_new_law_runs_what_scans_the_laws(finished):
+    law = finished.root / "surgisim" / "physics" / "terms" / "invented.py"
+    law.write_text('"""A law."""\n')
+    try:
+        assert {"estimation", "simulation"} <= finished.rules()
+        assert "reconstruction" not in finished.rules()
+    finally:
+        law.unlink()
+
+
+def test_a_setting_reaches_its_own_stage_and_what_follows(finished):
+    finished.choices = {"reconstruction": {"iterations": 7}}
+    try:
+        assert finished.rules() == below("reconstruction")
+    finally:
+        finished.choices = {}
+
+
+def test_what_a_failed_stage_left_from_before_is_not_taken_for_new(tree):
+    assert tree.run() == 0
+    tree.edit("stages/depth.py")
+    (tree.root / "broken").write_text("depth")
+    assert tree.run() != 0
+    assert tree.rules() == below("depth")
+    (tree.root / "broken").unlink()
+    assert tree.run() == 0
+    assert not tree.plan()
+
+
+def test_the_truth_reaches_the_evaluation_and_its_page_only():
+    users = [
+        line.split()[1].rstrip(":")
+        for path in (ROOT / "workflow" / "rules").glob("*.smk")
+        for block in path.read_text().split("\n\n\n")
+        if "truth=truth" in block
+        for line in block.splitlines()
+        if line.startswith("rule ")
+    ]
+    assert sorted(users) == ["evaluation", "report"]
+
+
+def test_a_stage_reads_only_from_stages_whose_settings_count_as_its_own():
+    # Otherwise a variant could share an output although something it depends on differs.
+    ancestors = {}
+    for stage, parents in PARENTS.items():
+        ancestors[stage] = set(parents).union(*(ancestors[p] for p in parents))
+    for path in (ROOT / "workflow" / "rules").glob("*.smk"):
+        for block in path.read_text().split("\nrule ")[1:]:
+            stage = block.split(":")[0]
+            read = {part.split('"')[1] for part in block.split("upstream(")[1:]}
+            assert read <= ancestors.get(stage, set()), (stage, read - ancestors[stage])
+
+
+def test_a_mistake_in_the_config_is_one_sentence(tree):
+    tree.choices = {"reconstruction": {"iteratons": 7}}
+    assert "there is no key 'reconstruction.iteratons'; did you mean 'iterations'?" in tree.says("--dry-run")
+
+
+def test_every_stage_has_a_rule_and_every_rule_a_log_a_benchmark_and_a_digest():
+    rules = "".join(path.read_text() for path in (ROOT / "workflow" / "rules").glob("*.smk"))
+    blocks = {block.split(":")[0]: block for block in rules.split("\nrule ")[1:]}
+    assert set(blocks) == {path.stem for path in (ROOT / "stages").glob("*.py")} == STAGES
+    for stage, block in blocks.items():
+        for key in ("log:", "benchmark:", "conda:", "mem_mb=", "code="):
+            assert key in block, (stage, key)
