@@ -90,7 +90,7 @@ def stage(
             cli.add_argument("--code", default="", help="digest of the code, written into the headers")
             cli.add_argument("--debug", action="store_true", help="show tracebacks")
             arguments = vars(cli.parse_args())
-            with plain_errors(arguments["debug"]):
+            with plain_errors(arguments["debug"] or bool(os.environ.get("SURGISIM_DEBUG"))):
                 _run(work, script.stem, reads, writes, settings, arguments)
 
         return main

@@ -64,7 +64,7 @@ class Tree:
     def surgisim(self, *arguments: str) -> subprocess.CompletedProcess:
         """The command line, in the copy."""
         command = [sys.executable, "-m", "surgisim.cli", *arguments]
-        return subprocess.run(command, cwd=self.root, env=self._environment(), capture_output=True, text=True)
+        return subprocess.run(command, cwd=self.root, env=self.environment(), capture_output=True, text=True)
 
     def _snakemake(self, *arguments: str) -> subprocess.CompletedProcess:
         self.out.mkdir(exist_ok=True)
@@ -72,9 +72,10 @@ class Tree:
         command = [sys.executable, "-m", "snakemake", "--snakefile", str(self.root / "workflow" / "Snakefile")]
         command += ["--directory", str(self.out), "--cores", "2", "--logger", "surgisim", *arguments]
         command += ["--config", *chosen] if chosen else []
-        return subprocess.run(command, env=self._environment(), capture_output=True, text=True)
+        return subprocess.run(command, env=self.environment(), capture_output=True, text=True)
 
-    def _environment(self) -> dict[str, str]:
+    def environment(self) -> dict[str, str]:
+        """With the copy first on the path, so that its own library is what runs."""
         paths = [self.root, self.root / "workflow" / "logger"]
         return os.environ | {"PYTHONPATH": os.pathsep.join(map(str, paths)), "COLUMNS": "500"}
 

@@ -126,12 +126,18 @@ def save_bytes(files: Mapping[Path, bytes]) -> None:
     try:
         for path, content in files.items():
             path.parent.mkdir(parents=True, exist_ok=True)
+            for left in path.parent.glob(f".{path.name}.*.part"):
+                left.unlink()  # by a process that was killed in mid-write
             temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
             waiting[temporary] = path
-            with open(temporary, "wb") as stream:
-                stream.write(content)
-                stream.flush()
-                os.fsync(stream.fileno())
+            try:
+                with open(temporary, "wb") as stream:
+                    stream.write(content)
+                    stream.flush()
+                    os.fsync(stream.fileno())
+            except OSError as error:
+                error.filename = str(path)
+                raise
         for temporary, path in waiting.items():
             os.replace(temporary, path)
     finally:

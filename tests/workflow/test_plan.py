@@ -104,7 +104,7 @@ def test_a_stage_sees_its_own_settings_only(tables):
 
 
 def test_a_variant_leaves_home_at_the_first_stage_it_touches(tables):
-    homes = tables(variants="main: {}\nfew: {reconstruction: {iterations: 9}}\n").homes
+    homes = tables(variants="main: {}\nfew: {reconstruction: {iterations: 50}}\n").homes
     assert homes["depth", "demo", "few"] == homes["tracking", "demo", "few"] == "main"
     assert homes["reconstruction", "demo", "few"] == homes["estimation", "demo", "few"] == "few"
 

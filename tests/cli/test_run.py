@@ -1,0 +1,156 @@
+"""The command line: what it says, what it leaves, and how it goes on."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+
+def sentence(done: subprocess.CompletedProcess) -> str:
+    """The one line that says what went wrong."""
+    said = [line for line in (done.stdout + done.stderr).splitlines() if line.startswith("error: ")]
+    assert "Traceback" not in done.stdout + done.stderr
+    assert len(said) == 1
+    return said[0]
+
+
+def test_a_clip_goes_through_the_whole_graph_and_the_second_time_through_nothing(tree):
+    (tree.root / "my clip.mp4").write_text("frames")
+    first = tree.surgisim("run", "my clip.mp4", "--out", "there")
+    assert first.returncode == 0
+    page = tree.root / "there" / "results" / "my_clip" / "main" / "report" / "report.html"
+    assert str(page) in first.stdout
+    assert page.is_file()
+    assert "nothing to do" in tree.surgisim("run", "my clip.mp4", "--out", "there").stdout
+
+
+def test_all_variants_of_a_table_of_clips_run_in_one_call(tree):
+    (tree.root / "two.tsv").write_text("name\tpath\na\tphantom\nb\tphantom\n")
+    done = tree.surgisim("run", "two.tsv", "--variant", "all", "--out", "there")
+    assert done.returncode == 0
+    assert done.stdout.count("report.html") == 12
+
+
+def test_a_missing_recording_is_one_sentence(tree):
+    done = tree.surgisim("run", "nowhere.mp4", "--out", "there")
+    assert done.returncode == 2
+    assert "nowhere.mp4: no such video" in sentence(done)
+
+
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        (["--set", "ingest.sise=3"], "did you mean 'size'"),
+        (["--set", "ingest.size"], "STAGE.KEY=VALUE is wanted"),
+        (["--set", "ingest.size=wide"], "key 'ingest.size' is 'wide'"),
+        (["--variant", "elastc"], "elastc"),
+        (["--until", "maskin"], "did you mean 'masking'"),
+        (["--profile", "cloud"], "known by name: default, gpu, slurm"),
+        (["--config", "none.yaml"], "none.yaml: no such file"),
+    ],
+)
+def test_a_wrong_option_is_one_sentence_and_leaves_no_result(tree, options, wanted):
+    done = tree.surgisim("demo", "--out", "there", *options)
+    assert done.returncode == 2
+    assert wanted in sentence(done)
+    assert not list(tree.root.glob("there/results/demo/*"))
+
+
+def test_what_a_stage_objects_to_reaches_the_user(tree):
+    (tree.root / "broken").write_text("depth")
+    done = tree.surgisim("demo", "--out", "there")
+    assert done.returncode == 2
+    assert sentence(done) == "error: depth demo/main: depth is broken on purpose."
+    (tree.root / "broken").unlink()
+    assert tree.surgisim("demo", "--out", "there").returncode == 0
+
+
+def test_a_fault_of_the_program_says_so_and_names_the_log(tree):
+    depth = tree.root / "stages" / "depth.py"
+    depth.write_text("1 / 0\n" + depth.read_text())
+    said = sentence(tree.surgisim("demo", "--out", "there"))
+    assert "ZeroDivisionError" in said
+    assert "logs/demo/main/depth.log" in said
+
+
+def test_settings_by_file_and_by_flag_reach_the_stages(tree):
+    (tree.root / "mine.yaml").write_text("ingest: {size: 100, tail: 0.3}\n")
+    done = tree.surgisim("demo", "--out", "there", "--config", "mine.yaml", "--set", "ingest.size=90", "-n")
+    assert done.returncode == 0
+    written = (tree.root / "there" / "results" / "run.yaml").read_text()
+    assert "size: 90" in written
+    assert "tail: 0.3" in written
+
+
+def test_a_package_without_its_checkout_says_what_to_do(tree, tmp_path, monkeypatch):
+    monkeypatch.setenv("SURGISIM_HOME", str(tmp_path / "empty"))
+    assert "Install from a checkout" in sentence(tree.surgisim("demo", "--out", "there"))
+
+
+def slow(tree, stage: str) -> None:
+    script = tree.root / "stages" / f"{stage}.py"
+    script.write_text("import time\ntime.sleep(60)\n" + script.read_text())
+
+
+def begin(tree, wait_for: str) -> subprocess.Popen:
+    """A run in the background, at work in the stage that is slow."""
+    command = [sys.executable, "-m", "surgisim.cli", "demo", "--out", "there"]
+    child = subprocess.Popen(command, cwd=tree.root, env=tree.environment(), stdout=subprocess.PIPE, text=True)
+    log = tree.root / "there" / "logs" / "demo" / "main" / f"{wait_for}.log"
+    for _ in range(600):
+        if log.exists():
+            time.sleep(0.5)
+            return child
+        time.sleep(0.1)
+    raise AssertionError("the slow stage never began")
+
+
+def test_interrupted_it_stops_its_stages_and_goes_on_the_next_time(tree):
+    quick = (tree.root / "stages" / "masking.py").read_text()
+    slow(tree, "masking")
+    child = begin(tree, "masking")
+    below = psutil.Process(child.pid).children(recursive=True)
+    os.kill(child.pid, signal.SIGINT)
+    assert "goes on" in child.communicate(timeout=30)[0]
+    assert child.returncode == 130
+    assert not any(process.is_running() for process in below)
+    (tree.root / "stages" / "masking.py").write_text(quick)
+    done = tree.surgisim("demo", "--out", "there")
+    assert done.returncode == 0
+    assert "ingest demo/main" not in done.stdout
+
+
+def test_killed_outright_it_goes_on_the_next_time(tree):
+    quick = (tree.root / "stages" / "masking.py").read_text()
+    slow(tree, "masking")
+    child = begin(tree, "masking")
+    for process in [psutil.Process(child.pid), *psutil.Process(child.pid).children(recursive=True)]:
+        process.kill()
+    child.wait()
+    (tree.root / "stages" / "masking.py").write_text(quick)
+    assert tree.surgisim("demo", "--out", "there").returncode == 0
+
+
+def test_two_runs_at_once_in_one_folder_are_refused(tree):
+    slow(tree, "masking")
+    child = begin(tree, "masking")
+    try:
+        assert "another run is at work" in sentence(tree.surgisim("demo", "--out", "there"))
+    finally:
+        os.kill(child.pid, signal.SIGINT)
+        child.wait(30)
+
+
+def test_doctor_and_terms_answer(tree):
+    looked = tree.surgisim("doctor")
+    assert looked.returncode == 0
+    for thing in ("processor", "memory", "GPU", "torch", "warp", "evaluation.lpips_weights"):
+        assert thing in looked.stdout
+    laws = tree.surgisim("terms").stdout
+    for law in Path(tree.root / "surgisim" / "physics" / "terms").glob("[a-z]*.py"):
+        assert law.stem in laws
