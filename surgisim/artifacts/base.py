@@ -56,7 +56,7 @@ class Artifact:
             if isinstance(error, Problem | FileNotFoundError):
                 raise
             raise Problem(
-                f"{path}: cannot be read as a {cls.__name__} ({error}). Delete it and run the stage that makes it again."
+                f"{path}: cannot be read as a {cls.__name__} ({error}). Delete it and run its stage again."
             ) from error
         return cls(**fields), header
 
