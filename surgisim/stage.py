@@ -34,6 +34,13 @@ class Maybe:
 
 
 @dataclass(frozen=True)
+class Several:
+    """One or more files of a kind: the function gets a list."""
+
+    kind: type[Artifact]
+
+
+@dataclass(frozen=True)
 class Bytes:
     """An output that is no artifact kind: the function returns its bytes."""
 
@@ -83,7 +90,8 @@ def stage(
             cli = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
             for name, kind in reads.items():
                 needed = kind.required if isinstance(kind, Source) else not isinstance(kind, Maybe)
-                cli.add_argument(_flag(name), type=Path, required=needed, help=f"read: {_wanted(kind)}")
+                count = {"nargs": "+"} if isinstance(kind, Several) else {}
+                cli.add_argument(_flag(name), type=Path, required=needed, help=f"read: {_wanted(kind)}", **count)
             for name, kind in writes.items():
                 cli.add_argument(_flag(name), type=Path, required=True, help=f"write: {_wanted(kind)}")
             cli.add_argument("--settings", default="{}", help="this stage's slice of the config, as JSON")
@@ -118,9 +126,11 @@ def _run(work, name, reads, writes, kind_of_settings, arguments) -> None:
     save_bytes(files)
 
 
-def _read(kind: Any, path: Path | None) -> Any:
+def _read(kind: Any, path: Any) -> Any:
     if isinstance(kind, Source):
         return path
+    if isinstance(kind, Several):
+        return [load(kind.kind, each) for each in path]
     if isinstance(kind, Maybe):
         return None if path is None else load(kind.kind, path)
     return load(kind, path)
@@ -163,5 +173,5 @@ def _wanted(kind: Any) -> str:
         return kind.wanted
     if isinstance(kind, Bytes):
         return f"a {kind.suffix} file"
-    kind = kind.kind if isinstance(kind, Maybe) else kind
+    kind = kind.kind if isinstance(kind, Maybe | Several) else kind
     return f"{kind.__name__} ({kind.SUFFIX}): {(kind.__doc__ or '').strip().splitlines()[0]}"

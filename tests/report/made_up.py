@@ -267,36 +267,18 @@ def _physics() -> Physics:
 
 def _fit() -> Fit:
     history = [
-        {
-            "round": r,
-            "window": [0, 3 * r + 3],
-            "misfit": 1.0 / (r + 1),
-            "parameters": {"corotated.nu": 0.45 - 0.006 * r, "newtonian.eta": 3 + 2 * r},
-        }
-        for r in range(5)
+        {"round": r, "last_frame": 12 * (r + 1), "iteration": k, "cost": 400.0 * (r + 1) / (k + 1) ** 2 + 20}
+        | {"corotated.E": 3000.0 * (1 + 0.02 * k), "newtonian.eta": 4.0 + 8 * (r + k / 3) / 3}
+        for r in range(3)
+        for k in range(4)
     ]
-    identifiability = {
-        "newtonian.eta / corotated.E": {
-            "value": 0.0039,
-            "unit": "s",
-            "low": 0.003,
-            "high": 0.005,
-            "phases": ["release"],
-            "identifiable": True,
-        },
-        "corotated.E": {
-            "value": 3100.0,
-            "unit": "Pa",
-            "low": 900.0,
-            "high": 9000.0,
-            "phases": [],
-            "identifiable": False,
-        },
-    }
-    held_out = {"fitted": 0.00042, "default": 0.00093}
-    return Fit(
-        history,
-        identifiability,
-        held_out,
-        "The clip tells the damping time and Poisson's ratio, not the stiffness itself.",
-    )
+    history += [
+        {"round": "field", "iteration": k, "track": 1.4 / (k + 1) + 0.4, "image": 0.1, "judged": 1.2 / (k + 1) + 0.6}
+        for k in range(6)
+    ]
+    shares = {"rest": 0.0, "load": 0.24, "hold": 0.11, "release": 0.65}
+    told = {"unit": "s", "value": 0.0039, "low": 0.003, "high": 0.005, "told": True, "phases": shares}
+    untold = {"unit": "Pa", "value": 3100.0, "low": 900.0, "high": 9000.0, "told": False, "phases": shares}
+    held_out = {"unit": "m", "default": 0.00093, "fitted": 0.00042, "after_release_fitted": None, "frames": [1, 9]}
+    words = "The clip tells how fast the tissue comes back, not how stiff it is."
+    return Fit(history, {"newtonian.eta / corotated.E": told, "corotated.E": untold}, held_out, words)

@@ -1,0 +1,1 @@
+"""A run on one page that needs nothing else: pictures, films, curves and numbers inside one HTML file."""

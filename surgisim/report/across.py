@@ -1,0 +1,124 @@
+"""All runs side by side: clips times variants."""
+
+import html
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from surgisim.artifacts.metrics import Metrics
+from surgisim.problem import Problem
+from surgisim.report.charts.compare import compare
+from surgisim.report.headline import shown
+from surgisim.report.page import template
+
+
+@dataclass(frozen=True)
+class Measure:
+    group: str
+    name: str
+    title: str
+    better: Literal["higher", "lower"]
+
+
+MEASURES = (
+    Measure("masking", "tool_iou", "instrument mask, overlap with the truth", "higher"),
+    Measure("depth", "true_relative", "depth off the truth, mean", "lower"),
+    Measure("depth", "given_relative", "depth off the given one, mean", "lower"),
+    Measure("tracking", "median", "tracks off the truth, median", "lower"),
+    Measure("grasp", "center", "gripped centre off the truth", "lower"),
+    Measure("reconstruction", "psnr_between", "scene, PSNR, held out between", "higher"),
+    Measure("reconstruction", "ssim_between", "scene, SSIM, held out between", "higher"),
+    Measure("reconstruction", "lpips_between", "scene, LPIPS, held out between", "lower"),
+    Measure("reconstruction", "psnr_first_25", "scene, PSNR, first 25 frames", "higher"),
+    Measure("reconstruction", "stretch_95", "splats' longest over shortest radius, 95th percentile", "lower"),
+    Measure("simulation", "true_held_out", "replay off true points, held out, median", "lower"),
+    Measure("simulation", "true_held_out_moving", "replay off true moving points, held out, mean", "lower"),
+    Measure("simulation", "true_released_moving", "replay off true moving points, after the release", "lower"),
+    Measure("simulation", "tracked_held_out", "replay off tracked points, held out, median", "lower"),
+    Measure("simulation", "tracked_held_out_moving", "replay off tracked moving points, held out, mean", "lower"),
+    Measure("simulation", "tracked_released_moving", "replay off tracked moving points, after the release", "lower"),
+    Measure("simulation", "psnr_between", "replay, PSNR, held out between", "higher"),
+    Measure("simulation", "psnr_after", "replay, PSNR, held out after", "higher"),
+    Measure("simulation", "ssim_between", "replay, SSIM, held out between", "higher"),
+    Measure("simulation", "lpips_between", "replay, LPIPS, held out between", "lower"),
+    Measure("replay", "smallest_det_f", "smallest det F of the replay", "higher"),
+)
+"""What the tables show. A variant that shares a stage with another shows the same number."""
+
+PLOTTED = (
+    ("reconstruction", "psnr_between"),
+    ("reconstruction", "psnr_first_25"),
+    ("simulation", "true_held_out_moving"),
+    ("simulation", "tracked_held_out_moving"),
+    ("simulation", "tracked_released_moving"),
+    ("simulation", "psnr_between"),
+)
+
+
+def table(runs: list[Metrics]) -> dict[str, Any]:
+    """Clip -> measure -> {"unit", "better", "protocol", "values": variant -> value, "best": variants}."""
+    result: dict[str, Any] = {}
+    for clip in dict.fromkeys(run.clip for run in runs):
+        mine = {run.variant: run for run in runs if run.clip == clip}
+        if len(mine) < sum(run.clip == clip for run in runs):
+            raise Problem(f"summary: clip '{clip}' has two runs of one variant. Pass each metrics.json once.")
+        result[clip] = {f"{m.group}.{m.name}": row for m in MEASURES if (row := _row(m, mine))}
+    return result
+
+
+def _row(measure: Measure, runs: dict[str, Metrics]) -> dict[str, Any] | None:
+    entries = {v: run.values.get(measure.group, {}).get(measure.name) for v, run in runs.items()}
+    values = {v: entry["value"] for v, entry in entries.items() if entry}
+    if not values:
+        return None
+    first = next(entry for entry in entries.values() if entry)
+    best = (max if measure.better == "higher" else min)(values.values())
+    return {
+        "title": measure.title,
+        "unit": first["unit"],
+        "better": measure.better,
+        "protocol": first["protocol"],
+        "values": values,
+        "best": [v for v, value in values.items() if value == best] if len(set(values.values())) > 1 else [],
+    }
+
+
+def page(runs: list[Metrics]) -> bytes:
+    """The summary as one HTML file, UTF-8."""
+    clips = table(runs)
+    variants = list(dict.fromkeys(run.variant for run in runs))
+    sections = [
+        {
+            "clip": clip,
+            "variants": [v for v in variants if any(v in row["values"] for row in rows.values())],
+            "rows": rows,
+            "links": {run.variant: _link(run) for run in runs if run.clip == clip},
+            "costs": {run.variant: _cost(run) for run in runs if run.clip == clip},
+        }
+        for clip, rows in clips.items()
+    ]
+    figures = list(_figures(clips, variants))
+    return template("summary.html.j2").render(sections=sections, figures=figures, shown=shown, runs=runs).encode()
+
+
+def _figures(clips: dict[str, Any], variants: list[str]) -> Iterator[tuple[str, str]]:
+    for group, name in PLOTTED:
+        rows = {clip: found for clip, rows in clips.items() if (found := rows.get(f"{group}.{name}"))}
+        if not rows:
+            continue
+        first = next(iter(rows.values()))
+        unit = "" if first["unit"] == "1" else f" [{first['unit']}]"
+        yield (
+            f"{first['title']}{unit}, {first['better']} is better",
+            compare({clip: row["values"] for clip, row in rows.items()}, variants),
+        )
+
+
+def _link(run: Metrics) -> str:
+    """From results/summary.html to the run's own report."""
+    return html.escape(f"{run.clip}/{run.variant}/report/report.html", quote=True)
+
+
+def _cost(run: Metrics) -> str:
+    seconds = sum(c.get("seconds", 0.0) for c in run.stages.values())
+    return f"{seconds / 60:.1f} min" if seconds else "–"

@@ -1,0 +1,1 @@
+"""One figure per file, each a function that returns a picture's address."""

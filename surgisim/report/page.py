@@ -1,0 +1,78 @@
+"""One run as one HTML file."""
+
+from importlib.resources import files
+
+import jinja2
+
+from surgisim.report import overlay
+from surgisim.report.contact import contact, depth_picture, depth_range, tracked_picture
+from surgisim.report.distrust import distrust
+from surgisim.report.films import Film, strip
+from surgisim.report.headline import headline
+from surgisim.report.palette import DEPTH, PHASE, gradient
+from surgisim.report.parameters import parameters
+from surgisim.report.plots import plots
+from surgisim.report.scenery import body_views, material_views, scene_views, side_film
+from surgisim.report.story import Story
+from surgisim.report.tables import grids, lists
+
+
+def page(story: Story, *, progress=lambda *_: None) -> bytes:
+    """The report, UTF-8, with every picture and film inside."""
+    width = story.settings.panel
+    progress(0, 5, "contact sheet")
+    content = {"story": story, "cards": headline(story), "doubts": distrust(story), "rows": contact(story)}
+    progress(1, 5, "films")
+    content["films"] = films(story)
+    progress(2, 5, "scene and body")
+    content["scene"] = scene_views(story.run.scene, story.run.camera, width)
+    content["body"] = body_views(story, (700, 600))
+    content["materials"] = material_views(story, (700, 600))
+    progress(4, 5, "curves and tables")
+    content["plots"] = plots(story)
+    content["parameters"] = parameters(story.run.physics, story.run.fit)
+    content["grids"], content["lists"] = grids(story.metrics), lists(story.metrics)
+    content["phase_colors"] = PHASE
+    text = template("report.html.j2").render(**content)
+    progress(5, 5, "written")
+    return text.encode()
+
+
+def template(name: str) -> jinja2.Template:
+    """A template beside this file; everything put into it is escaped."""
+    loader = jinja2.FunctionLoader(lambda part: files("surgisim.report").joinpath(part).read_text())
+    place = jinja2.Environment(
+        loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    return place.get_template(name)
+
+
+def films(story: Story) -> list[tuple[str, Film]]:
+    """Title and film, in the order of the page."""
+    run, fps, settings = story.run, story.run.camera.fps, story.settings
+    whole = range(run.camera.frames)
+    beside = {"recording": run.frames.rgb, "reconstruction": run.rendered.rgb}
+    if story.replayed:
+        beside["replay of the fitted body"] = run.replay.rgb
+    zoom = round(0.75 * settings.panel)
+    low, high = depth_range(story)
+    unit = "mm" if run.camera.scale == "known" else "mm*"
+    seen = {
+        "masks: instrument green, highlights orange": [
+            overlay.masks(run.frames.rgb[t], run.masks.tool[t], run.masks.specular[t], run.masks.tissue[t])
+            for t in whole
+        ],
+        "instrument taken out": run.inpainted.rgb,
+        "depth": [depth_picture(story, t, zoom) for t in whole],
+        "tracks and grasp": [tracked_picture(story, t, zoom) for t in whole],
+    }
+    box = (round(1.4 * settings.panel), settings.panel)
+    bar = (gradient(DEPTH), f"{1e3 * low:.0f}", f"{1e3 * high:.0f}", f"depth along the view [{unit}]")
+    return [
+        ("Recorded, reconstructed, replayed", strip(beside, fps, settings.panel, settings.quality)),
+        (
+            "The replay from where no camera was",
+            side_film(story, box, settings.quality),
+        ),
+        ("What the stages saw", strip(seen, fps, zoom, settings.quality, bar=bar)),
+    ]

@@ -1,0 +1,137 @@
+"""The canonical scene and the thick body, from the camera and from where no camera was."""
+
+import dataclasses
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.scene import Scene
+from surgisim.gaussians.attributes import drawn
+from surgisim.gaussians.rasterise import render, to_bytes
+from surgisim.measure.flow_at import spacing
+from surgisim.report.charts.particles import particles
+from surgisim.report.films import Film, joined
+from surgisim.report.palette import HELD, MATERIAL, MOVED, gradient, mapped, rgb
+from surgisim.report.story import Story
+from surgisim.report.uri import jpeg
+from surgisim.report.views import View, balls, look
+
+WHITE = (1.0, 1.0, 1.0)
+
+
+def scene_views(scene: Scene, camera: Camera, width: int) -> dict[str, str]:
+    """Caption -> picture of the canonical Gaussians, turned about their middle."""
+    zoom = width / camera.width
+    fine = dataclasses.replace(
+        camera,
+        width=width,
+        height=round(camera.height * zoom),
+        fx=camera.fx * zoom,
+        fy=camera.fy * zoom,
+        cx=(camera.cx + 0.5) * zoom - 0.5,
+        cy=(camera.cy + 0.5) * zoom - 0.5,
+    )
+    views = {"from the camera": (0, 0), "from 35° to the left": (35, 0), "from 40° above": (0, -40)}
+    return {name: jpeg(turned(scene, fine, *angles)) for name, angles in views.items()}
+
+
+def turned(scene: Scene, camera: Camera, yaw: float, pitch: float) -> np.ndarray:
+    """The scene as a camera sees it that went round its middle by yaw and pitch [degrees], (H, W, 3) uint8."""
+    mean, rotation, scale, opacity, color = drawn(scene)
+    middle = np.median(mean, 0)
+    turn = Rotation.from_euler("yx", [yaw, pitch], degrees=True)
+    placed = turn.apply(mean - middle) + middle
+    quaternion = (turn * Rotation.from_quat(rotation, scalar_first=True)).as_quat(scalar_first=True)
+    return to_bytes(render(placed, quaternion, scale, opacity, color, camera, background=WHITE).rgb)
+
+
+def colors(story: Story) -> np.ndarray:
+    """Particles' own colours, held ones marked, (P, 3) 0-255."""
+    body = story.run.body
+    own = 255 * body.color.astype(float)
+    return np.where(body.held[:, None], 0.35 * own + 0.65 * rgb(HELD), own)
+
+
+def body_views(story: Story, size: tuple[int, int]) -> dict[str, str]:
+    """Caption -> figure of the thick body."""
+    run = story.run
+    rest, ball = run.body.rest.astype(float), _radius(story)
+    unit = _unit(story)
+    flank = look(rest, 90, 0, size)
+    grips = tuple(zip(run.motion.center_rest, run.motion.radius, strict=True))
+    cut = section(story)
+    away, below, sideways = f"away from the camera, z [{unit}]", f"down, y [{unit}]", f"right, x [{unit}]"
+    views = {
+        "from the camera": particles(
+            rest, colors(story), ball, look(rest, 0, 0, size), across=sideways, down=below, grips=grips
+        ),
+        "from the side": particles(rest, colors(story), ball, flank, across=away, down=below),
+        "cut open at the grip": particles(
+            rest[cut], colors(story)[cut], ball, flank, across=away, down=below, grips=grips
+        ),
+    }
+    return views
+
+
+def material_views(story: Story, size: tuple[int, int]) -> dict[str, str]:
+    """Caption -> map of each parameter that varies over the body by more than 1 %."""
+    run, found = story.run, {}
+    rest = run.body.rest.astype(float)
+    for name, column in zip(story.material.names, story.material.values.T, strict=True):
+        low, high = np.percentile(column, [1, 99])
+        if high - low <= 0.01 * abs(column.mean()):
+            continue
+        law, _, parameter = str(name).partition(".")
+        unit = run.physics.terms.get(law, {}).get(parameter, {}).get("unit", "1")
+        found[str(name)] = particles(
+            rest,
+            mapped(column, low, high, MATERIAL).astype(float),
+            _radius(story),
+            look(rest, 0, 0, size),
+            across=f"right, x [{_unit(story)}]",
+            down=f"down, y [{_unit(story)}]",
+            bar=(MATERIAL, float(low), float(high), f"{name} [{unit}]"),
+        )
+    return found
+
+
+def section(story: Story) -> np.ndarray:
+    """Particles in a slab through the grip, or through the middle, (P,) bool."""
+    run = story.run
+    x = run.body.rest[:, 0]
+    at = run.motion.center_rest[0, 0] if len(run.motion.radius) else np.median(x)
+    return np.abs(x - at) <= 1.25 * run.body.spacing
+
+
+def side_film(story: Story, size: tuple[int, int], quality: int) -> Film:
+    """The replay from where no camera was: turned, and cut open with its displacement in colour."""
+    run = story.run
+    rest, position = run.body.rest.astype(float), run.replay.position.astype(float)
+    moved = np.linalg.norm(position - rest, axis=-1)
+    top = max(float(moved.max()), 1e-9)
+    both = np.concatenate([rest, *position[:: max(len(position) // 8, 1)]])
+    oblique, flank = look(both, 40, 25, size), look(both, 90, 0, size)
+    cut = section(story)
+    panels = {
+        "turned by 40° and lifted by 25°; held particles in pink": _frames(
+            position, np.broadcast_to(colors(story), position.shape), _radius(story), oblique
+        ),
+        "cut open at the grip, seen from the side: how far each particle is from its rest": _frames(
+            position[:, cut], mapped(moved[:, cut], 0, top, MOVED).astype(float), _radius(story), flank
+        ),
+    }
+    bar = (gradient(MOVED), "0", f"{1e3 * top:.1f}", f"displacement [{_unit(story)}]")
+    return joined(panels, run.camera.fps, quality, bar=bar)
+
+
+def _frames(position: np.ndarray, color: np.ndarray, radius: float, view: View) -> np.ndarray:
+    return np.stack([balls(p, c, radius, view) for p, c in zip(position, color, strict=True)])
+
+
+def _radius(story: Story) -> float:
+    return 0.62 * spacing(story.run.body.rest)
+
+
+def _unit(story: Story) -> str:
+    return "mm" if story.run.camera.scale == "known" else "mm*"

@@ -1,0 +1,69 @@
+"""Particles seen from where no camera was: painted balls, the far ones first."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class View:
+    """An orthographic look along `right` x `down`."""
+
+    right: np.ndarray
+    """Unit vector that points right in the picture, camera frame, (3,)."""
+    down: np.ndarray
+    """Unit vector that points down, (3,)."""
+    low: np.ndarray
+    """Left and top edge along them [m], (2,)."""
+    high: np.ndarray
+    """Right and bottom edge [m], (2,)."""
+    width: int
+    """[px]"""
+    height: int
+    """[px]"""
+
+    @property
+    def zoom(self) -> float:
+        """[px/m]"""
+        return self.width / float(self.high[0] - self.low[0])
+
+    def place(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pixels (..., 2) and distance along the look [m], (...), of points (..., 3)."""
+        flat = np.stack([points @ self.right, points @ self.down], -1)
+        return (flat - self.low) * self.zoom, points @ np.cross(self.right, self.down)
+
+
+def look(points: np.ndarray, yaw: float, pitch: float, size: tuple[int, int], margin: float = 0.05) -> View:
+    """A view of `size`, width and height [px], that holds all points (..., 3), turned by yaw and pitch [degrees].
+
+    Yaw 90 looks at the body's flank: the camera is on the left, away from it is right.
+    """
+    a, b = np.radians([yaw, pitch])
+    right = np.array([np.cos(a), 0, np.sin(a)])
+    forward = np.array([-np.sin(a) * np.cos(b), np.sin(b), np.cos(a) * np.cos(b)])
+    down = np.cross(forward, right)
+    flat = np.stack([points @ right, points @ down], -1).reshape(-1, 2)
+    low, high = flat.min(0), flat.max(0)
+    pixel = (1 + 2 * margin) * float(((high - low) / size).max())
+    middle, half = (low + high) / 2, pixel * np.array(size) / 2
+    return View(right, down, middle - half, middle + half, *size)
+
+
+def balls(points: np.ndarray, color: np.ndarray, radius: float, view: View) -> np.ndarray:
+    """Picture (H, W, 3) uint8 on white of balls of one radius [m]: points (Q, 3), colour (Q, 3) 0-255."""
+    pixels, far = view.place(points)
+    size = max(radius * view.zoom, 0.75)
+    reach = int(np.ceil(size))
+    dy, dx = (a.ravel() for a in np.mgrid[-reach : reach + 1, -reach : reach + 1])
+    x, y = np.rint(pixels[:, 0]).astype(int), np.rint(pixels[:, 1]).astype(int)
+    from_center = ((x[:, None] + dx - pixels[:, :1]) ** 2 + (y[:, None] + dy - pixels[:, 1:]) ** 2) / size**2
+    column, row = x[:, None] + dx, y[:, None] + dy
+    hit = (from_center <= 1) & (column >= 0) & (column < view.width) & (row >= 0) & (row < view.height)
+    who = np.broadcast_to(np.arange(len(points))[:, None], hit.shape)[hit]
+    rise = np.sqrt(1 - from_center[hit])
+    # The nearest part of a ball wins the pixel: paint far to near.
+    order = np.argsort(-(far[who] - radius * rise), kind="stable")
+    picture = np.full((view.height, view.width, 3), 255, np.uint8)
+    shaded = color[who] * (0.55 + 0.45 * rise)[:, None]
+    picture[row[hit][order], column[hit][order]] = shaded[order].clip(0, 255).astype(np.uint8)
+    return picture
