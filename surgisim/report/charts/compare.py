@@ -24,5 +24,5 @@ def compare(values: dict[str, dict[str, float]], variants: list[str]) -> str:
         axes.set_yticks(range(len(values)), list(values), color=INK)
         axes.set_ylim(len(values) - 0.5, -0.5)
         axes.margins(x=0.08)
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.28 / max(len(values), 1) - 0.12), ncols=3)
+        figure.legend(loc="outside lower center", ncols=3)
         return address(figure)
