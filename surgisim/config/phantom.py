@@ -24,27 +24,27 @@ class Phantom(Settings):
     """Camera to the middle of the tissue [m]."""
     slant: float = Field(0.32, ge=0, le=1.0)
     """Angle between the view and the tissue's normal [rad]."""
-    relief: float = Field(1.3e-3, ge=0)
+    relief: float = Field(1.6e-3, ge=0)
     """RMS height of the hills [m]."""
     thickness: float = Field(0.016, gt=0)
     """Of the tissue above its held base [m]."""
     margin: float = Field(3e-3, ge=0)
     """How far the tissue reaches beyond the image [m]."""
     sides: Literal["free", "held"] = "free"
-    """Whether the four sides of the tissue are free or held still."""
+    """Whether the four sides of the tissue are free or held still [name]."""
     spacing: float = Field(2.8e-3, gt=0)
     """Edge of the finite elements [m]."""
-    E: float = 1100.0
+    E: float = 500.0
     """Young's modulus [Pa]."""
     nu: float = 0.45
     """Poisson's ratio [1]."""
-    eta: float = 2.5
+    eta: float = 1.8
     """Viscosity [Pa s]."""
     density: float = 1050.0
     """Of the tissue [kg/m^3]."""
-    grip_radius: float = Field(0.005, gt=0)
+    grip_radius: float = Field(0.0055, gt=0)
     """Of the ball of tissue that the jaws carry [m]."""
-    pull: float = Field(7.5e-3, ge=0)
+    pull: float = Field(8.5e-3, ge=0)
     """How far it is carried [m]."""
     lift: float = 0.75
     """Angle of the pull above the tissue's plane [rad]."""
@@ -54,7 +54,7 @@ class Phantom(Settings):
     """When the pull begins [s]."""
     hold: float = 0.8
     """When the pull has arrived [s]."""
-    release: float = 1.4
+    release: float = 1.56
     """When the jaws let go [s]."""
     points: int = Field(300, ge=1)
     """Surface points whose true paths are recorded [1]."""

@@ -4,8 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surgisim.phantom.forces import CORNERS
+from surgisim.phantom.elements import CORNERS
 from surgisim.problem import Problem
+
+CHORDS = 0.19
+"""A third of the share of a ball's volume outside the hull of lattice nodes on its skin, over (spacing / radius)^2."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +61,11 @@ class Block:
     uv: np.ndarray
     """[m], (N, 2)."""
     cells: np.ndarray
-    """(M, 8), in the order of forces.CORNERS with xi along u, eta along v, zeta into the tissue."""
+    """(M, 8), in the order of elements.CORNERS with xi along u, eta along v, zeta into the tissue."""
     fixed: np.ndarray
     """Held still, (N,) bool."""
     gripped: np.ndarray
-    """In or on the grip's ball, (N,) bool."""
+    """In or on the driven ball, (N,) bool."""
     triangles: np.ndarray
     """The upper side and the four sides, outward by the right hand, (F, 3)."""
 
@@ -80,7 +83,7 @@ def mesh(shape: Shape, grip: Grip, spacing: float, *, hold_sides: bool) -> Block
     # Fractions of the extent; array axes are (depth, v, u).
     down, back, along = np.meshgrid(steps[2], steps[1], steps[0], indexing="ij")
     uv = shape.low + np.stack([along, back], -1) * (shape.high - shape.low)
-    local, gripped = _onto_sphere(shape, grip, _local(shape, uv, down), down, min(spacing, grip.radius))
+    local, gripped = _onto_sphere(shape, grip, _local(shape, uv, down), down)
     edge = np.zeros(nodes[::-1], bool)
     edge[-1] = True
     if hold_sides:
@@ -105,26 +108,30 @@ def _local(shape: Shape, uv: np.ndarray, down: np.ndarray) -> np.ndarray:
     return np.concatenate([uv, (top + down * (shape.thickness - top))[..., None]], -1)
 
 
-def _onto_sphere(shape, grip, local, down, spacing):
-    """Move every node within half a spacing of the sphere onto it, so no lattice edge crosses it elsewhere.
+def _onto_sphere(shape, grip, local, down):
+    """Move every node within half an edge of the sphere onto it, so no lattice edge crosses it elsewhere.
 
-    Upper nodes stay on the upper side. The nodes around follow smoothly.
+    Upper nodes stay on the upper side. The nodes around follow smoothly. The sphere is larger than the grip's by
+    what the chords between its nodes cut off, so that their hull has the ball's volume.
     """
     center = np.append(grip.uv, -shape.relief(grip.uv))
+    edges = [np.linalg.norm(np.diff(local, axis=axis), axis=-1) for axis in range(3)]
+    spacing = np.mean([e.mean() for e in edges])
+    radius = grip.radius * (1 + CHORDS * (spacing / grip.radius) ** 2)
     moved = local.copy()
     away = np.linalg.norm(local - center, axis=-1)
-    near = np.abs(away - grip.radius) < spacing / 2
+    near = np.abs(away - radius) < max(e.max() for e in edges) / 2
     upper = down == 0
     ray = (local - center)[near & ~upper]
-    moved[near & ~upper] = center + ray * (grip.radius / np.linalg.norm(ray, axis=-1, keepdims=True))
+    moved[near & ~upper] = center + ray * (radius / np.linalg.norm(ray, axis=-1, keepdims=True))
     flat = (local[..., :2] - grip.uv)[near & upper]
     scale = np.ones(len(flat))
     for _ in range(60):  # the relief makes this a fixed point, not a formula
         at = grip.uv + flat * scale[:, None]
         reach = np.linalg.norm(_local(shape, at, np.zeros(len(at))) - center, axis=-1)
-        scale *= grip.radius / reach
+        scale *= radius / reach
     moved[near & upper] = _local(shape, grip.uv + flat * scale[:, None], np.zeros(len(flat)))
-    gripped = near | (away < grip.radius)
+    gripped = near | (away < radius)
     shift = moved - local
     free = ~near
     free[-1] = False

@@ -9,11 +9,16 @@ from surgisim.config.phantom import Phantom
 from surgisim.phantom import instrument, shading
 from surgisim.phantom.block import Block, mesh
 from surgisim.phantom.case import Case, generator, invent
-from surgisim.phantom.forces import elements
+from surgisim.phantom.elements import elements
 from surgisim.phantom.march import Drive, march
 from surgisim.phantom.points import choose, follow
 from surgisim.phantom.texture import paint
 from surgisim.phantom.view import look
+
+BITE = 6e-4
+"""How far above the tissue at rest the axis of the closed jaws' tips lies [m]."""
+RETREAT = 0.030
+"""How far the tool draws back after release [m]."""
 
 
 def film(settings: Phantom, progress=None) -> tuple[np.ndarray, Truth]:
@@ -27,9 +32,7 @@ def film(settings: Phantom, progress=None) -> tuple[np.ndarray, Truth]:
 
 def move(case: Case, block: Block, times: np.ndarray, progress=None) -> np.ndarray:
     """Node positions at `times` [s], camera frame [m], (T, N, 3)."""
-    drive = Drive(
-        lambda t: case.timeline.carried(t)[:, None] * case.pull, case.timeline.grasp, case.timeline.release
-    )
+    drive = Drive(lambda t: case.timeline.carried(t)[:, None] * case.pull, case.timeline.grasp, case.timeline.release)
     return march(block, elements(block.points, block.cells, case.law), drive, times, progress)
 
 
@@ -81,9 +84,11 @@ def tool_at(case: Case, t: float) -> np.ndarray:
     tip = case.shape.upper(case.grip.uv) + float(case.timeline.carried(t)) * case.pull
     along = tip - case.tool.port
     along /= np.linalg.norm(along)
-    bite = 0.0012 * case.shape.axes[2] * (1 - min(case.timeline.gape(t), 1.0))
-    back = case.timeline.retreat(t) * 0.030 * along
-    return instrument.pose(case.tool, tip + bite - back, 0.10 + 0.65 * case.timeline.gape(t))
+    depth = case.shape.axes[2]
+    ahead = along - (along @ depth) * depth
+    tip = tip + 0.4 * case.grip.radius * ahead / np.linalg.norm(ahead) - BITE * depth
+    back = case.timeline.retreat(t) * RETREAT * along
+    return instrument.pose(case.tool, tip - back, 0.10 + 0.65 * case.timeline.gape(t))
 
 
 def parameters(settings: Phantom, case: Case) -> dict:
@@ -100,7 +105,12 @@ def parameters(settings: Phantom, case: Case) -> dict:
         "pull": case.pull.tolist(),
         "timeline": {"grasp": line.grasp, "pull": line.pull, "hold": line.hold, "release": line.release},
         "camera": {
-            "width": view.width, "height": view.height, "fps": settings.fps,
-            "fx": view.focal, "fy": view.focal, "cx": cx, "cy": cy,
+            "width": view.width,
+            "height": view.height,
+            "fps": settings.fps,
+            "fx": view.focal,
+            "fy": view.focal,
+            "cx": cx,
+            "cy": cy,
         },
     }

@@ -2,74 +2,18 @@
 
 Total Lagrangian, 2 x 2 x 2 Gauss points. Within an element positions and velocities are written in the
 seven modes xi, eta, zeta, xi eta, eta zeta, zeta xi, xi eta zeta, whose gradients at a Gauss point cost a
-third of the nodal ones. Elements go through in blocks of `LANES`, the innermost loop, so that the
+third of the nodal ones. Elements go through in blocks of LANES, the innermost loop, so that the
 compiler can use the machine's vector instructions.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
-from surgisim.phantom.law import Law
-from surgisim.problem import Problem
+from surgisim.phantom.elements import GAUSS, LANES
 
-LANES = L = 8
+L = LANES
 FAST = {"contract", "reassoc", "arcp", "nsz"}
-CORNERS = np.array([[(a & 1), (a >> 1 & 1), (a >> 2 & 1)] for a in range(8)]) * 2.0 - 1.0
-"""xi, eta, zeta of the eight nodes, the first fastest, (8, 3)."""
-GAUSS = CORNERS / np.sqrt(3)
-
-
-@dataclass(frozen=True)
-class Elements:
-    """Elements in blocks of LANES; the last block is filled up with elements of no weight."""
-
-    cells: np.ndarray
-    """Node numbers, (B, 8, LANES)."""
-    inverse: np.ndarray
-    """d xi_k / d X_j at each Gauss point [1/m], (B, 8, 9, LANES)."""
-    weight: np.ndarray
-    """Rest volume of each Gauss point [m^3], (B, 8, LANES)."""
-    mu: np.ndarray
-    """[Pa], (B, LANES)."""
-    lam: np.ndarray
-    """[Pa], (B, LANES)."""
-    eta: np.ndarray
-    """[Pa s], (B, LANES)."""
-    mass: np.ndarray
-    """Lumped at the nodes [kg], (N,)."""
-
-
-def elements(points: np.ndarray, cells: np.ndarray, law: Law) -> Elements:
-    """Blocks for nodes at rest `points` [m], (N, 3), and `cells`, (M, 8) in the order of CORNERS."""
-    jacobian = np.einsum("mai,gak->mgik", points[cells], np.stack([_slopes(g) for g in GAUSS]))
-    volume = np.linalg.det(jacobian)
-    if volume.min() <= 0:
-        raise Problem(f"phantom: element {int(volume.min(1).argmin())} of the mesh is inside out. Use a finer spacing.")
-    inverse = np.linalg.inv(jacobian).reshape(len(cells), 8, 9)
-    shape = np.prod(1 + GAUSS[:, None] * CORNERS, axis=2) / 8
-    mass = np.zeros(len(points))
-    np.add.at(mass, cells, law.density * volume @ shape)
-    lanes = lambda a: _blocks(a, len(cells))  # noqa: E731
-    same = np.ones(len(cells))
-    padded = lanes(volume)
-    padded[-1, :, (len(cells) - 1) % LANES + 1 :] = 0.0
-    return Elements(
-        lanes(cells), lanes(inverse), padded, lanes(law.mu * same), lanes(law.lam * same), lanes(law.eta * same), mass
-    )
-
-
-def _slopes(at: np.ndarray) -> np.ndarray:
-    """d N_a / d xi_k at one point, (8, 3)."""
-    terms = 1 + at * CORNERS
-    return np.stack([CORNERS[:, k] * np.delete(terms, k, 1).prod(1) for k in range(3)], 1) / 8
-
-
-def _blocks(values: np.ndarray, count: int) -> np.ndarray:
-    """(M, ...) to (B, ..., LANES), repeating element 0 at the end."""
-    rows = np.concatenate([values, np.repeat(values[:1], -count % LANES, 0)])
-    return np.ascontiguousarray(np.moveaxis(rows.reshape(-1, LANES, *values.shape[1:]), 1, -1))
+"""Liberties of arithmetic, without which nothing is vectorised; NaN and infinity keep their meaning."""
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
@@ -168,9 +112,7 @@ def _swell(m, p, q, r):
         a02 = m[60 * L + j] + m[72 * L + j] * q + m[78 * L + j] * p + m[84 * L + j] * p * q
         a12 = m[61 * L + j] + m[73 * L + j] * q + m[79 * L + j] * p + m[85 * L + j] * p * q
         a22 = m[62 * L + j] + m[74 * L + j] * q + m[80 * L + j] * p + m[86 * L + j] * p * q
-        m[145 * L + j] += (
-            a00 * (a11 * a22 - a12 * a21) + a01 * (a12 * a20 - a10 * a22) + a02 * (a10 * a21 - a11 * a20)
-        )
+        m[145 * L + j] += a00 * (a11 * a22 - a12 * a21) + a01 * (a12 * a20 - a10 * a22) + a02 * (a10 * a21 - a11 * a20)
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
@@ -200,12 +142,36 @@ def _stress(m, p, q, r):
         i10, i11, i12 = m[138 * L + j], m[139 * L + j], m[140 * L + j]
         i20, i21, i22 = m[141 * L + j], m[142 * L + j], m[143 * L + j]
         # F = a i and its rate, R = b i
-        f00, f01, f02 = a00 * i00 + a01 * i10 + a02 * i20, a00 * i01 + a01 * i11 + a02 * i21, a00 * i02 + a01 * i12 + a02 * i22
-        f10, f11, f12 = a10 * i00 + a11 * i10 + a12 * i20, a10 * i01 + a11 * i11 + a12 * i21, a10 * i02 + a11 * i12 + a12 * i22
-        f20, f21, f22 = a20 * i00 + a21 * i10 + a22 * i20, a20 * i01 + a21 * i11 + a22 * i21, a20 * i02 + a21 * i12 + a22 * i22
-        r00, r01, r02 = b00 * i00 + b01 * i10 + b02 * i20, b00 * i01 + b01 * i11 + b02 * i21, b00 * i02 + b01 * i12 + b02 * i22
-        r10, r11, r12 = b10 * i00 + b11 * i10 + b12 * i20, b10 * i01 + b11 * i11 + b12 * i21, b10 * i02 + b11 * i12 + b12 * i22
-        r20, r21, r22 = b20 * i00 + b21 * i10 + b22 * i20, b20 * i01 + b21 * i11 + b22 * i21, b20 * i02 + b21 * i12 + b22 * i22
+        f00, f01, f02 = (
+            a00 * i00 + a01 * i10 + a02 * i20,
+            a00 * i01 + a01 * i11 + a02 * i21,
+            a00 * i02 + a01 * i12 + a02 * i22,
+        )
+        f10, f11, f12 = (
+            a10 * i00 + a11 * i10 + a12 * i20,
+            a10 * i01 + a11 * i11 + a12 * i21,
+            a10 * i02 + a11 * i12 + a12 * i22,
+        )
+        f20, f21, f22 = (
+            a20 * i00 + a21 * i10 + a22 * i20,
+            a20 * i01 + a21 * i11 + a22 * i21,
+            a20 * i02 + a21 * i12 + a22 * i22,
+        )
+        r00, r01, r02 = (
+            b00 * i00 + b01 * i10 + b02 * i20,
+            b00 * i01 + b01 * i11 + b02 * i21,
+            b00 * i02 + b01 * i12 + b02 * i22,
+        )
+        r10, r11, r12 = (
+            b10 * i00 + b11 * i10 + b12 * i20,
+            b10 * i01 + b11 * i11 + b12 * i21,
+            b10 * i02 + b11 * i12 + b12 * i22,
+        )
+        r20, r21, r22 = (
+            b20 * i00 + b21 * i10 + b22 * i20,
+            b20 * i01 + b21 * i11 + b22 * i21,
+            b20 * i02 + b21 * i12 + b22 * i22,
+        )
         # cofactors c: F^-T = c / J
         c00, c01, c02 = f11 * f22 - f12 * f21, f12 * f20 - f10 * f22, f10 * f21 - f11 * f20
         c10, c11, c12 = f02 * f21 - f01 * f22, f00 * f22 - f02 * f20, f01 * f20 - f00 * f21
@@ -224,13 +190,37 @@ def _stress(m, p, q, r):
         e = w * 2.0 * m[148 * L + j] * over
         s = w * (0.5 * m[147 * L + j] * (m[145 * L + j] - 1.0 / m[145 * L + j]) - m[146 * L + j] * over)
         t00, t11, t22, t01, t12, t20 = s + e * d00, s + e * d11, s + e * d22, e * d01, e * d12, e * d20
-        p00, p01, p02 = k * f00 + t00 * c00 + t01 * c10 + t20 * c20, k * f01 + t00 * c01 + t01 * c11 + t20 * c21, k * f02 + t00 * c02 + t01 * c12 + t20 * c22
-        p10, p11, p12 = k * f10 + t01 * c00 + t11 * c10 + t12 * c20, k * f11 + t01 * c01 + t11 * c11 + t12 * c21, k * f12 + t01 * c02 + t11 * c12 + t12 * c22
-        p20, p21, p22 = k * f20 + t20 * c00 + t12 * c10 + t22 * c20, k * f21 + t20 * c01 + t12 * c11 + t22 * c21, k * f22 + t20 * c02 + t12 * c12 + t22 * c22
+        p00, p01, p02 = (
+            k * f00 + t00 * c00 + t01 * c10 + t20 * c20,
+            k * f01 + t00 * c01 + t01 * c11 + t20 * c21,
+            k * f02 + t00 * c02 + t01 * c12 + t20 * c22,
+        )
+        p10, p11, p12 = (
+            k * f10 + t01 * c00 + t11 * c10 + t12 * c20,
+            k * f11 + t01 * c01 + t11 * c11 + t12 * c21,
+            k * f12 + t01 * c02 + t11 * c12 + t12 * c22,
+        )
+        p20, p21, p22 = (
+            k * f20 + t20 * c00 + t12 * c10 + t22 * c20,
+            k * f21 + t20 * c01 + t12 * c11 + t22 * c21,
+            k * f22 + t20 * c02 + t12 * c12 + t22 * c22,
+        )
         # dual of a: h_ik = P_ij i_kj
-        h00, h01, h02 = p00 * i00 + p01 * i01 + p02 * i02, p00 * i10 + p01 * i11 + p02 * i12, p00 * i20 + p01 * i21 + p02 * i22
-        h10, h11, h12 = p10 * i00 + p11 * i01 + p12 * i02, p10 * i10 + p11 * i11 + p12 * i12, p10 * i20 + p11 * i21 + p12 * i22
-        h20, h21, h22 = p20 * i00 + p21 * i01 + p22 * i02, p20 * i10 + p21 * i11 + p22 * i12, p20 * i20 + p21 * i21 + p22 * i22
+        h00, h01, h02 = (
+            p00 * i00 + p01 * i01 + p02 * i02,
+            p00 * i10 + p01 * i11 + p02 * i12,
+            p00 * i20 + p01 * i21 + p02 * i22,
+        )
+        h10, h11, h12 = (
+            p10 * i00 + p11 * i01 + p12 * i02,
+            p10 * i10 + p11 * i11 + p12 * i12,
+            p10 * i20 + p11 * i21 + p12 * i22,
+        )
+        h20, h21, h22 = (
+            p20 * i00 + p21 * i01 + p22 * i02,
+            p20 * i10 + p21 * i11 + p22 * i12,
+            p20 * i20 + p21 * i21 + p22 * i22,
+        )
         m[90 * L + j] += h00
         m[91 * L + j] += h10
         m[92 * L + j] += h20

@@ -42,10 +42,10 @@ def pose(tool: Grasper, tip: np.ndarray, gape: float) -> np.ndarray:
     ]
     for sign in (-1, 1):
         out = np.cos(gape / 2) * along + sign * np.sin(gape / 2) * side
-        bow = hinge + 0.5 * tool.jaw_length * out + sign * 0.12 * tool.jaw_length * side
         # Bowed like a dissector's, so that light shows between closed jaws.
+        bow = hinge + 0.45 * tool.jaw_length * out + sign * 0.07 * tool.jaw_length * side
         end = hinge + tool.jaw_length * out
-        cones += [(hinge, bow, 0.5 * r, 0.36 * r, JAW), (bow, end, 0.36 * r, 0.24 * r, JAW)]
+        cones += [(hinge, bow, 0.58 * r, 0.46 * r, JAW), (bow, end, 0.46 * r, 0.30 * r, JAW)]
     return np.array([[*a, *b, ra, rb, part] for a, b, ra, rb, part in cones])
 
 
@@ -72,12 +72,16 @@ def _trace(cones, rays, depth, normal, part, station):
             if z < depth[n]:
                 depth[n] = z
                 part[n] = int(cones[k, 8])
-                at = z * rays[n]
-                h, _ = _nearest(cones[k], at[0], at[1], at[2])
-                axis = cones[k, 3:6] - cones[k, :3]
-                out = at - cones[k, :3] - h * axis
-                normal[n] = out / np.sqrt((out * out).sum())
-                station[n] = h * np.sqrt((axis * axis).sum())
+                h, _ = _nearest(cones[k], z * x, z * y, z)
+                length2 = size = 0.0
+                for i, at in enumerate((z * x, z * y, z)):
+                    axis = cones[k, 3 + i] - cones[k, i]
+                    normal[n, i] = at - cones[k, i] - h * axis
+                    length2 += axis * axis
+                    size += normal[n, i] ** 2
+                for i in range(3):
+                    normal[n, i] /= np.sqrt(size)
+                station[n] = h * np.sqrt(length2)
 
 
 @njit(cache=True)

@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 
 from surgisim.phantom.block import Block
-from surgisim.phantom.forces import Elements, add_forces
+from surgisim.phantom.elements import SLOPES, Elements
+from surgisim.phantom.forces import FAST, add_forces
 from surgisim.problem import Problem
 
 SAFETY = 0.6
@@ -45,12 +46,18 @@ def march(block: Block, parts: Elements, drive: Drive, times: np.ndarray, progre
     for t in range(1, len(times)):
         ends = times[t - 1] + dt * np.arange(substeps + 1)
         held = (ends[1:] > drive.begin) & (ends[1:] <= drive.end + dt / 2)
-        _advance(x, v, block.points, pull, grip, drive.shift(ends), held, dt, *_arrays(parts), scratch)
+        advance(x, v, block.points, pull, grip, drive.shift(ends), held, dt, *_arrays(parts), scratch)
         bad = ~np.isfinite(x).all(1)
         if bad.any():
             raise Problem(
                 f"phantom: node {int(bad.argmax())} is not finite at {times[t]:.3f} s, with {substeps} steps a frame. "
                 "Pull less far or more slowly, or use a stiffer or more viscous tissue."
+            )
+        squeezed = least_swelling(x, block.cells)
+        if squeezed <= 0:
+            raise Problem(
+                f"phantom: an element is inside out at {times[t]:.3f} s. Pull less far or more slowly, or use a finer "
+                "spacing."
             )
         positions[t] = x
         if progress:
@@ -70,6 +77,11 @@ def stable_step(points: np.ndarray, parts: Elements, fixed: np.ndarray) -> float
     w2 = _largest(lambda a: _forces(points + tiny * a, rest, parts) / -tiny, parts.mass, fixed)
     d = _largest(lambda a: _forces(points, a, parts) * -1.0, parts.mass, fixed)
     return (math.sqrt(d * d + 4 * w2) - d) / w2
+
+
+def least_swelling(x: np.ndarray, cells: np.ndarray) -> float:
+    """Least determinant of d x / d xi over all Gauss points [m^3]; not positive where an element is inside out."""
+    return float(np.linalg.det(np.tensordot(x[cells], SLOPES, ((1,), (1,))).swapaxes(1, 2)).min())
 
 
 def _largest(apply, mass: np.ndarray, fixed: np.ndarray) -> float:
@@ -96,8 +108,13 @@ def _arrays(parts: Elements) -> tuple[np.ndarray, ...]:
     return parts.cells, parts.inverse, parts.weight, parts.mu, parts.lam, parts.eta
 
 
-@njit(cache=True)
-def _advance(x, v, rest, pull, grip, path, held, dt, cells, inverse, weight, mu, lam, eta, force):
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def advance(x, v, rest, pull, grip, path, held, dt, cells, inverse, weight, mu, lam, eta, force):
+    """Take len(held) steps of dt [s] in place.
+
+    `pull` is dt / mass of each node, 0 where fixed; `path` the displacement [m] of the nodes `grip`, rows s and
+    s + 1 before and after step s, followed where `held`.
+    """
     for s in range(len(held)):
         force[:] = 0.0
         add_forces(x, v, cells, inverse, weight, mu, lam, eta, force)

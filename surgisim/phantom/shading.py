@@ -10,6 +10,9 @@ from surgisim.phantom.instrument import JAW, SHAFT
 from surgisim.phantom.texture import Texture
 from surgisim.phantom.view import Hits
 
+AMBIENT, SHARP, BROAD = 0.06, 1.6, 0.06
+"""Shares of light: from all around; of a wet film's glints, and its sheen."""
+
 
 @dataclass(frozen=True)
 class Lamp:
@@ -21,16 +24,6 @@ class Lamp:
     """Loss of light at the image's corners, 0-1."""
 
 
-@njit(cache=True)
-def _normals(points, triangles, out):
-    for f in range(len(triangles)):
-        a, b, c = triangles[f]
-        n = np.cross(points[b] - points[a], points[c] - points[a])
-        out[a] += n
-        out[b] += n
-        out[c] += n
-
-
 def tissue(
     hits: Hits, rays: np.ndarray, points: np.ndarray, block: Block, shape: Shape, texture: Texture, lamp: Lamp
 ) -> np.ndarray:
@@ -38,55 +31,62 @@ def tissue(
     corner = np.zeros_like(points)
     _normals(points, block.triangles, corner)
     out = np.zeros((*hits.z.shape, 3))
-    arrays = block.triangles, block.uv, corner, texture.low, texture.albedo, texture.slope, texture.gloss, shape.axes
-    _tissue(hits.z, hits.triangle, hits.weights, rays, *arrays, _pitch(texture, shape), lamp.distance, out)
+    skin = block.triangles, block.uv, corner, shape.low, texture.layers, shape.axes
+    pitch = (shape.high - shape.low) / (np.array(texture.layers.shape[1::-1]) - 1)
+    _tissue(hits.z, hits.triangle, hits.weights, rays, *skin, pitch, lamp.distance, out)
     return out
 
 
-def _pitch(texture: Texture, shape: Shape) -> np.ndarray:
-    return (shape.high - shape.low) / (np.array(texture.gloss.shape[::-1]) - 1)
+@njit(cache=True)
+def _normals(points, triangles, out):
+    """Add to each corner the triangle's normal, as long as twice its area."""
+    for f in range(len(triangles)):
+        a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+        ux, uy, uz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
+        vx, vy, vz = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1], points[c, 2] - points[a, 2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        for k in (a, b, c):
+            out[k, 0] += nx
+            out[k, 1] += ny
+            out[k, 2] += nz
 
 
 @njit(cache=True)
-def _tissue(z, triangle, weights, rays, triangles, uv, corner, low, albedo, slope, gloss, axes, pitch, distance, out):
-    rows, columns = gloss.shape
-    n = np.zeros(3)
+def _tissue(z, triangle, weights, rays, triangles, uv, corner, low, paint, axes, pitch, distance, out):
+    rows, columns, layers = paint.shape
+    texel = np.zeros(layers)
     for y in range(z.shape[0]):
         for x in range(z.shape[1]):
             f = triangle[y, x]
             if f < 0:
                 continue
-            n[:] = 0.0
-            u = v = 0.0
+            u = v = nx = ny = nz = 0.0
             for k in range(3):
                 share, a = weights[y, x, k], triangles[f, k]
                 u += share * uv[a, 0]
                 v += share * uv[a, 1]
-                n += share * corner[a]
+                nx += share * corner[a, 0]
+                ny += share * corner[a, 1]
+                nz += share * corner[a, 2]
             # Bilinear look-up, at the edge the last texel.
             p = min(max((u - low[0]) / pitch[0], 0.0), columns - 1.001)
             q = min(max((v - low[1]) / pitch[1], 0.0), rows - 1.001)
             i, j = int(p), int(q)
             p, q = p - i, q - j
-            w00, w10, w01, w11 = (1 - p) * (1 - q), p * (1 - q), (1 - p) * q, p * q
-            su = w00 * slope[j, i, 0] + w10 * slope[j, i + 1, 0] + w01 * slope[j + 1, i, 0] + w11 * slope[j + 1, i + 1, 0]
-            sv = w00 * slope[j, i, 1] + w10 * slope[j, i + 1, 1] + w01 * slope[j + 1, i, 1] + w11 * slope[j + 1, i + 1, 1]
-            shine = w00 * gloss[j, i] + w10 * gloss[j, i + 1] + w01 * gloss[j + 1, i] + w11 * gloss[j + 1, i + 1]
-            n /= np.sqrt((n * n).sum())
-            n -= su * axes[0] + sv * axes[1]
-            n /= np.sqrt((n * n).sum())
-            away = np.sqrt((rays[y, x] ** 2).sum())
-            facing = abs((n * rays[y, x]).sum()) / away
+            for c in range(layers):
+                upper = (1 - p) * paint[j, i, c] + p * paint[j, i + 1, c]
+                texel[c] = (1 - q) * upper + q * ((1 - p) * paint[j + 1, i, c] + p * paint[j + 1, i + 1, c])
+            size = np.sqrt(nx * nx + ny * ny + nz * nz)
+            nx = nx / size - texel[3] * axes[0, 0] - texel[4] * axes[1, 0]
+            ny = ny / size - texel[3] * axes[0, 1] - texel[4] * axes[1, 1]
+            nz = nz / size - texel[3] * axes[0, 2] - texel[4] * axes[1, 2]
+            dx, dy = rays[y, x, 0], rays[y, x, 1]
+            away = np.sqrt(dx * dx + dy * dy + 1.0)
+            facing = abs(nx * dx + ny * dy + nz) / (away * np.sqrt(nx * nx + ny * ny + nz * nz))
             light = (distance / (z[y, x] * away)) ** 2
-            glint = 0.9 * shine * facing**220 + 0.05 * shine * facing**24
+            glint = texel[5] * (SHARP * facing**400 + BROAD * facing**30)
             for c in range(3):
-                a = (
-                    w00 * albedo[j, i, c]
-                    + w10 * albedo[j, i + 1, c]
-                    + w01 * albedo[j + 1, i, c]
-                    + w11 * albedo[j + 1, i + 1, c]
-                )
-                out[y, x, c] = light * (a * (0.06 + 0.94 * facing) + glint)
+                out[y, x, c] = light * (texel[c] * (AMBIENT + (1 - AMBIENT) * facing) + glint)
 
 
 def steel(rays: np.ndarray, z: np.ndarray, normal: np.ndarray, part: np.ndarray, station: np.ndarray, lamp: Lamp):
@@ -96,7 +96,7 @@ def steel(rays: np.ndarray, z: np.ndarray, normal: np.ndarray, part: np.ndarray,
     light = (lamp.distance / (z * away)) ** 2
     grey = np.where(part == SHAFT, 0.13, np.where(part == JAW, 0.34, 0.26))
     bands = np.where((part == SHAFT) & (station > 1.5e-3) & (station < 2.6e-3), 0.5, 1.0)
-    teeth = np.where(part == JAW, 0.85 + 0.15 * np.sign(np.sin(station * 2 * np.pi / 1.1e-3)), 1.0)
+    teeth = np.where(part == JAW, 0.92 + 0.08 * np.sign(np.sin(station * 2 * np.pi / 1.0e-3)), 1.0)
     body = (grey * bands * teeth * (0.10 + 0.90 * facing))[:, None] * np.array([0.96, 1.0, 1.03])
     # Wet walls all around shine back at grazing angles.
     walls = (0.10 * (1 - facing) ** 2)[:, None] * np.array([1.0, 0.42, 0.36])

@@ -13,47 +13,43 @@ PITCH = 1.1e-4
 
 @dataclass(frozen=True)
 class Texture:
-    low: np.ndarray
-    """u, v of the first texel [m], (2,)."""
-    albedo: np.ndarray
-    """Linear colour, 0-1, (V, U, 3) float32."""
-    slope: np.ndarray
-    """Of the fine relief along u and v, (V, U, 2) float32."""
-    gloss: np.ndarray
-    """Strength of highlights, 0-1, (V, U) float32."""
+    """Spread evenly from the shape's least to its greatest u, v."""
+
+    layers: np.ndarray
+    """Linear colour 0-1, slope of the fine relief along u and v, strength of glints 0-1; (V, U, 6) float32."""
 
 
 def paint(shape: Shape, rng: np.random.Generator) -> Texture:
     """Moist pink tissue with mottling, fat, branching vessels and fine grain."""
     size = np.ceil((shape.high - shape.low) / PITCH).astype(int)[::-1]
-    blood = 0.55 * _clouds(size, rng, [8e-3, 4e-3]) + 0.45 * _clouds(size, rng, [2e-3, 1e-3])
-    fat = _smoothstep(1.1, 2.0, _clouds(size, rng, [7e-3, 3e-3, 1.2e-3]))
-    grain = _clouds(size, rng, [1.1e-3, 0.6e-3, 0.35e-3])
-    veins, arteries = _vessels(size, rng, 7, 5.5e-4), _vessels(size, rng, 8, 3.2e-4)
-    pink, red, yellow = np.array([0.62, 0.24, 0.20]), np.array([0.40, 0.085, 0.07]), np.array([0.78, 0.55, 0.30])
-    share = _smoothstep(-1.6, 1.6, blood)[..., None]
+    blood = 0.75 * _clouds(size, rng, [16e-3, 7e-3]) + 0.65 * _clouds(size, rng, [3.5e-3, 1.8e-3])
+    fat = _smoothstep(0.7, 2.2, _clouds(size, rng, [14e-3, 6e-3, 2e-3]))
+    grain = _clouds(size, rng, [1.3e-3, 0.8e-3])
+    veins, arteries = _vessels(size, rng, 4, 6.5e-4), _vessels(size, rng, 6, 3.2e-4)
+    pink, red, yellow = np.array([0.60, 0.27, 0.22]), np.array([0.44, 0.115, 0.095]), np.array([0.66, 0.40, 0.17])
+    share = _smoothstep(-2.2, 2.2, blood)[..., None]
     colour = pink * (1 - share) + red * share
-    colour = colour * (1 - 0.75 * fat[..., None]) + yellow * 0.75 * fat[..., None]
-    colour *= np.exp(0.22 * grain)[..., None]
-    colour = _stain(colour, veins, np.array([0.20, 0.035, 0.065]), 0.75)
-    colour = _stain(colour, arteries, np.array([0.42, 0.030, 0.025]), 0.80)
-    height = 6e-5 * _clouds(size, rng, [3e-3, 1.5e-3]) + 1.4e-5 * grain + 1.2e-4 * veins + 8e-5 * arteries
+    colour = colour * (1 - 0.7 * fat[..., None]) + yellow * 0.7 * fat[..., None]
+    colour *= np.exp(0.10 * grain + 0.10 * _clouds(size, rng, [2.6e-3]))[..., None]
+    colour = _stain(colour, veins, np.array([0.24, 0.045, 0.070]), 0.70)
+    colour = _stain(colour, arteries, np.array([0.38, 0.030, 0.028]), 0.75)
+    height = 1.5e-4 * _clouds(size, rng, [7e-3, 3.5e-3]) + 1.8e-5 * _clouds(size, rng, [1.8e-3]) + 1.0e-4 * veins
     slope = np.stack([np.gradient(height, PITCH, axis=1), np.gradient(height, PITCH, axis=0)], -1)
-    gloss = np.clip(0.6 + 0.25 * _clouds(size, rng, [5e-3, 2e-3]), 0.1, 1.0)
-    single = np.float32
-    return Texture(shape.low, np.clip(colour, 0.01, 0.95).astype(single), slope.astype(single), gloss.astype(single))
+    wet = _smoothstep(0.0, 2.0, _clouds(size, rng, [9e-3, 4e-3]))
+    layers = np.concatenate([np.clip(colour, 0.01, 0.95), slope, 0.04 + 0.96 * wet[..., None]], -1)
+    return Texture(layers.astype(np.float32))
 
 
 def _clouds(size: np.ndarray, rng: np.random.Generator, scales: list[float]) -> np.ndarray:
     """Smooth noise of unit variance at several scales [m]."""
     total = np.zeros(size, np.float32)
     for scale in scales:
-        step = scale / PITCH / 2.5
+        step = scale / PITCH / 3.5
         coarse = rng.standard_normal(np.ceil(size / step).astype(int) + 3).astype(np.float32)
         corner = rng.uniform(0, 1, 2)
         turn = np.array([[1 / step, 0, corner[0]], [0, 1 / step, corner[1]]], np.float32)
         layer = cv2.warpAffine(
-            cv2.GaussianBlur(coarse, (0, 0), 0.7),
+            cv2.GaussianBlur(coarse, (0, 0), 1.0),
             turn,
             (int(size[1]), int(size[0])),
             flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
@@ -80,7 +76,7 @@ def _branch(canvas, at, heading, radius, depth, rng) -> None:
         turn = 0.8 * turn + rng.normal(0, 0.06)
         heading += turn
         to = at + step * np.array([np.cos(heading), np.sin(heading)])
-        shade = float(min(1.0, 0.35 + 0.3 * radius))
+        shade = float(min(1.0, 0.25 + 0.22 * radius))
         width = max(1, round(2 * radius))
         ends = [tuple(int(c) for c in np.rint(p * 8)) for p in (at, to)]
         cv2.line(canvas, ends[0], ends[1], shade, width, cv2.LINE_AA, 3)

@@ -21,10 +21,10 @@ class Timeline:
     end: float
 
     def __post_init__(self) -> None:
-        order = [0.0, self.grasp, self.pull, self.hold, self.release, self.end]
-        if order[0] >= order[1] or any(a > b for a, b in zip(order[1:], order[2:], strict=False)):
+        if not 0 < self.grasp <= self.pull < self.hold <= self.release <= self.end:
             raise Problem(
-                f"phantom: grasp, pull, hold, release and duration are {order[1:]} s, but must come in this order."
+                f"phantom: grasp {self.grasp}, load {self.pull}, hold {self.hold}, release {self.release} and "
+                f"duration {self.end} s must come in this order."
             )
 
     def carried(self, t: np.ndarray) -> np.ndarray:
