@@ -67,7 +67,7 @@ def test_what_a_stage_objects_to_reaches_the_user(tree):
     assert done.returncode == 2
     assert sentence(done) == "error: depth demo/main: depth is broken on purpose."
     (tree.root / "broken").unlink()
-    assert tree.surgisim("demo", "--out", "there").returncode == 0
+    assert tree.surgisim("demo", "--out", "there", "--until", "depth").returncode == 0
 
 
 def test_a_fault_of_the_program_says_so_and_names_the_log(tree):
@@ -120,7 +120,7 @@ def test_interrupted_it_stops_its_stages_and_goes_on_the_next_time(tree):
     assert child.returncode == 130
     assert not any(process.is_running() for process in below)
     (tree.root / "stages" / "masking.py").write_text(quick)
-    done = tree.surgisim("demo", "--out", "there")
+    done = tree.surgisim("demo", "--out", "there", "--until", "masking")
     assert done.returncode == 0
     assert "ingest demo/main" not in done.stdout
 
@@ -133,7 +133,7 @@ def test_killed_outright_it_goes_on_the_next_time(tree):
         process.kill()
     child.wait()
     (tree.root / "stages" / "masking.py").write_text(quick)
-    assert tree.surgisim("demo", "--out", "there").returncode == 0
+    assert tree.surgisim("demo", "--out", "there", "--until", "masking").returncode == 0
 
 
 def test_two_runs_at_once_in_one_folder_are_refused(tree):

@@ -40,14 +40,6 @@ def test_variants_share_what_they_do_not_change(tree):
     assert made["evaluation"] == made["report"] == set(VARIANTS)
 
 
-def test_two_clips_with_all_variants_run_in_one_call(tree):
-    (tree.root / "config" / "clips.tsv").write_text("name\tpath\none\tphantom\ntwo\tphantom\n")
-    tree.choices = {"run": VARIANTS}
-    assert tree.run() == 0
-    assert len(list(tree.out.glob("results/*/*/report/report.html"))) == 2 * len(VARIANTS)
-    assert not tree.plan()
-
-
 def test_a_hundred_clips_are_planned(tree):
     rows = "".join(f"clip{i}\tphantom\t{100 + i}\n" for i in range(100))
     (tree.root / "config" / "clips.tsv").write_text("name\tpath\tfocal\n" + rows)
@@ -90,14 +82,15 @@ def test_a_new_law_runs_what_scans_the_laws(finished):
     law = finished.root / "surgisim" / "physics" / "terms" / "invented.py"
     law.write_text('"""A law."""\n')
     try:
-        assert {"estimation", "simulation"} <= finished.rules()
-        assert "reconstruction" not in finished.rules()
+        started = finished.rules()
+        assert {"estimation", "simulation"} <= started
+        assert "reconstruction" not in started
     finally:
         law.unlink()
 
 
 def test_a_setting_reaches_its_own_stage_and_what_follows(finished):
-    finished.choices = {"reconstruction": {"iterations": 7}}
+    finished.choices = {"reconstruction": {"iterations": 70}}
     try:
         assert finished.rules() == below("reconstruction")
     finally:
