@@ -1,0 +1,77 @@
+"""Depth of the tissue by the backend that the settings or the recording ask for."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.depth import Depth
+from surgisim.artifacts.given import Given
+from surgisim.artifacts.inpainted import SEEN, Inpainted
+from surgisim.artifacts.masks import Masks
+from surgisim.config import depth as config
+from surgisim.perception.depth import depth_anything, given, near_light, stereo
+from surgisim.problem import Problem
+
+FLAT = 0.1
+"""Confidence where depth was only filled in from around."""
+
+
+def depth(
+    inpainted: Inpainted,
+    masks: Masks,
+    given_: Given,
+    camera: Camera,
+    settings: config.Depth,
+    *,
+    progress: Callable[[float, float, str], None] | None = None,
+) -> Depth:
+    """z of the tissue in every pixel, behind the instrument too."""
+    rgb = inpainted.rgb
+    if masks.tool.shape != rgb.shape[:3]:
+        raise Problem(
+            f"depth: masks are {masks.tool.shape} and frames {rgb.shape[:3]}; pass masks of the same clip and size."
+        )
+    hidden = masks.tool | (inpainted.origin != SEEN)
+    name = choose(settings.backend, given_)
+    if name == "given":
+        z, confidence, scale = given.estimate(given_, hidden, camera, rgb, distance=settings.distance)
+    elif name == "stereo":
+        z, confidence, scale = stereo.estimate(rgb, hidden, given_, camera, distance=settings.distance)
+    elif name == "depth_anything":
+        z, confidence, scale = depth_anything.estimate(
+            rgb, hidden, settings.weights, distance=settings.distance, range_=settings.range, progress=progress
+        )
+    else:
+        z, confidence = near_light.estimate(
+            rgb,
+            hidden,
+            masks.specular,
+            camera,
+            distance=settings.distance,
+            relief=settings.relief,
+            size=settings.lattice,
+            progress=progress,
+        )
+        scale = "arbitrary"
+    confidence = np.where(inpainted.origin == SEEN, confidence, np.minimum(confidence, FLAT))
+    return Depth(z.astype(np.float32), confidence.astype(np.float32), scale)
+
+
+def choose(wanted: str, given_: Given) -> str:
+    """The backend behind `auto`."""
+    if wanted == "given" and not len(given_.depth):
+        raise Problem(
+            "depth: backend 'given' needs depth that came with the recording, and there is none. "
+            "Set depth.backend to 'auto' or 'near_light'."
+        )
+    if wanted == "stereo" and not len(given_.right):
+        raise Problem(
+            "depth: backend 'stereo' needs a right view, and the recording has none. "
+            "Set depth.backend to 'auto' or 'near_light'."
+        )
+    if wanted != "auto":
+        return wanted
+    if len(given_.depth):
+        return "given"
+    return "stereo" if len(given_.right) else "near_light"

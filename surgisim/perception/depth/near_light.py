@@ -1,0 +1,190 @@
+"""Depth from the lamp that rides on the endoscope; needs no weights.
+
+A lamp at the camera lights a surface of albedo rho at distance d under slant theta with I = rho cos(theta) / d^2.
+With w = log z on the image, X = (x - cx) / fx, Y alike and r = (X, Y, 1), that is
+
+    log I = log rho - 2 w - 3 log |r| - 1/2 log(w_X^2 + w_Y^2 + (1 + X w_X + Y w_Y)^2)
+
+(perspective near-light shading; Prados and Faugeras, Shape from shading: a well-posed problem?, CVPR 2005).
+In frame 0 albedo and shape share the blame: what goes with the hue is albedo, what is smooth is mostly shape.
+Afterwards the albedo is known: it travels with the tissue, so a change of brightness along its way is a change of
+distance and slant. The absolute size is not known: the median depth of frame 0 is set to a nominal one.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from surgisim.artifacts.camera import Camera
+from surgisim.perception.depth.leaning import follow_leaning
+from surgisim.perception.depth.shading import Lattice, explain, shading
+from surgisim.perception.tracking.spread import spread
+from surgisim.perception.tracking.warp import follow_surface
+
+TRUST = 0.5
+"""Confidence of a well explained pixel: brightness tells changes well and shapes only roughly."""
+ALBEDO, HUE = 0.25, 0.3
+"""Spread of log albedo that hue does not explain; of the hue's coefficients."""
+FIRST_DETAIL, LATER_DETAIL = 0.6, 0.3
+"""Finest wave of shape, and of its changes, that is believed, as shares of the longer image side."""
+NOISE = 0.1
+"""Spread of log brightness along a tissue point's way, highlights' skirts included."""
+STILL, SLACK = 0.003, 0.3
+"""Spread of log depth's change where nothing moves across the view; per radian of such motion nearby."""
+
+
+@dataclass(frozen=True)
+class _Look:
+    """One frame on the lattice, with what frame 0's tissue brings along."""
+
+    start: np.ndarray
+    """Log depth the tissue had in frame 0, (h, w)."""
+    light: np.ndarray
+    """Log brightness over the tissue's albedo, (h, w)."""
+    weight: np.ndarray
+    """How far the tissue is known, 0-1, (h, w)."""
+    moved: np.ndarray
+    """How far it moved across the view [rad], (h, w)."""
+
+
+def estimate(
+    rgb: np.ndarray,
+    hidden: np.ndarray,
+    specular: np.ndarray,
+    camera: Camera,
+    *,
+    distance: float = 0.07,
+    size: int = 64,
+    relief: float = 0.3,
+    progress: Callable[[float, float, str], None] | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Depth [m] and confidence 0-1 of a recording without its instrument, (T, H, W) float32 each.
+
+    rgb: sRGB, (T, H, W, 3) uint8. hidden: pixels whose colour is not the tissue's at that time, specular: highlights,
+    (T, H, W) bool. distance: median depth of frame 0 [m]. size: longer side of the lattice it is solved on [px].
+    relief: expected spread of log depth in frame 0.
+    """
+    ratio = min(1.0, size / max(rgb.shape[1:3]))
+    lattice = Lattice.of(camera, ratio)
+    light, hue, known = _read(rgb[0], hidden[0] | specular[0], lattice.shape)
+    rest = _first(lattice, light, hue, known, relief)
+    rest += np.log(distance) - np.median(rest[known > 0.5] if (known > 0.5).any() else rest)
+    albedo = light + shading(lattice, rest)
+    looks, origin = [], lattice.pixels
+    for t, warp in enumerate(follow_surface(rgb, hidden)):
+        look, origin = _look(lattice, warp, rgb[t], hidden[t] | specular[t], rest, albedo, origin, ratio * camera.fx)
+        looks.append(look)
+        if progress:
+            progress(t + 1, 2 * len(rgb), "light along the tissue's way")
+    z, confidence = [], []
+    for t, (look, leaning) in enumerate(zip(looks, follow_leaning(lattice, looks), strict=True)):
+        about = look.start + leaning * look.moved
+        log_z, misfit = explain(
+            lattice,
+            look.light,
+            look.weight,
+            about,
+            spread_of_data=NOISE,
+            spread_of_shape=STILL + SLACK * _around(look.moved),
+            finest=LATER_DETAIL,
+            smooth_about=about,
+            begin=about,
+        )
+        z.append(_grow(np.exp(log_z), rgb.shape[1:3]))
+        trust = TRUST * np.exp(-((misfit / 0.3) ** 2)) * (0.2 + 0.8 * look.weight)
+        confidence.append(np.clip(_grow(trust, rgb.shape[1:3]), 0.0, 1.0))
+        if progress:
+            progress(len(rgb) + t + 1, 2 * len(rgb), "depth from light")
+    return np.stack(z).astype(np.float32), np.stack(confidence).astype(np.float32)
+
+
+def _look(lattice, warp, rgb, covered, rest, albedo, origin, focal) -> tuple[_Look, np.ndarray]:
+    sure = _shrink(warp.seen * np.exp(-((warp.error / 0.8) ** 2)), lattice.shape)
+    scale = np.array(lattice.shape[::-1]) / np.array(rgb.shape[1::-1])
+    position = (_shrink(warp.position, lattice.shape) + 0.5) * scale - 0.5
+    origin, weight = _inverse(position, sure, origin, lattice)
+    start = spread(_at(rest, origin), weight)
+    moved = spread(np.linalg.norm(origin - lattice.pixels, axis=-1), weight) / focal
+    moved = cv2.GaussianBlur(moved.astype(np.float32), (0, 0), 1.5).astype(float)
+    light, _, known = _read(rgb, covered, lattice.shape)
+    weight = weight * known
+    excess = light - _at(albedo, origin)
+    still = (weight > 0.5) & (moved < 0.5 / focal)
+    gain = np.median((excess + shading(lattice, start))[still]) if still.mean() > 0.05 else 0.0
+    return _Look(start, np.where(weight > 0, excess - gain, 0.0), weight, moved), origin
+
+
+def linear_light(rgb: np.ndarray) -> np.ndarray:
+    """sRGB uint8 as linear light, 0-1, float32."""
+    level = np.arange(256, dtype=np.float32) / 255
+    return np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4).astype(np.float32)[rgb]
+
+
+def _read(rgb: np.ndarray, covered: np.ndarray, shape: tuple[int, int]):
+    """Log brightness (h, w), hue (h, w, 2) and the share of usable pixels (h, w) on the small lattice."""
+    usable = ~covered & (rgb.max(-1) < 250) & (rgb.max(-1) > 8)
+    share = _shrink(usable, shape)
+    mean = _shrink(linear_light(rgb) * usable[..., None], shape) / np.maximum(share, 1e-6)[..., None]
+    mean = np.maximum(spread(mean, share), 1e-5)
+    hue = np.log(mean[..., :1] / mean[..., 1:])
+    return np.log(mean.mean(-1)).astype(float), hue.astype(float), share.astype(float)
+
+
+def _first(lattice: Lattice, light: np.ndarray, hue: np.ndarray, known: np.ndarray, relief: float) -> np.ndarray:
+    """Log depth of frame 0, about 0: shape and hue's share of the albedo in turns."""
+    log_z, use = np.zeros_like(light), known > 0.5
+    if use.sum() < 16:
+        return log_z
+    features = hue - np.median(hue[use], axis=0)
+    for _ in range(6):
+        rho = light + shading(lattice, log_z)
+        tilt = features[use].T @ features[use] / use.sum() + (ALBEDO / HUE) ** 2 / 50 * np.eye(2)
+        weights = np.linalg.solve(tilt, features[use].T @ (rho[use] - np.median(rho[use])) / use.sum())
+        painted = features @ weights
+        level = np.median((rho - painted)[use])
+        log_z, _ = explain(
+            lattice,
+            light - painted - level,
+            known,
+            np.zeros_like(log_z),
+            spread_of_data=ALBEDO,
+            spread_of_shape=relief,
+            finest=FIRST_DETAIL,
+            begin=log_z,
+        )
+    return log_z
+
+
+def _inverse(position: np.ndarray, seen: np.ndarray, start: np.ndarray, lattice: Lattice):
+    """Where in frame 0 each pixel came from (h, w, 2) [lattice px], and how surely, 0-1 (h, w)."""
+    grid, origin = lattice.pixels, start
+    for _ in range(15):
+        origin = origin + 0.7 * (grid - _at(position, origin))
+    miss = np.linalg.norm(_at(position, origin) - grid, axis=-1)
+    high, wide = lattice.shape
+    inside = (origin > -1).all(-1) & (origin[..., 0] < wide) & (origin[..., 1] < high)
+    good = np.exp(-((miss / 0.5) ** 2)) * inside * _at(seen.astype(np.float32), origin)
+    return np.where(np.isfinite(origin), origin, grid).astype(np.float32), good
+
+
+def _around(moved: np.ndarray) -> np.ndarray:
+    """The largest motion nearby: tissue that comes straight at the camera moves only at its rim."""
+    reach = max(round(0.08 * max(moved.shape)), 1)
+    most = cv2.dilate(moved.astype(np.float32), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+    return cv2.GaussianBlur(most, (0, 0), reach).astype(float)
+
+
+def _at(field: np.ndarray, where: np.ndarray) -> np.ndarray:
+    x, y = where[..., 0].astype(np.float32), where[..., 1].astype(np.float32)
+    out = cv2.remap(field.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return out.astype(float)
+
+
+def _shrink(field: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    return cv2.resize(field.astype(np.float32), shape[::-1], interpolation=cv2.INTER_AREA)
+
+
+def _grow(field: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    return cv2.resize(field, shape[::-1], interpolation=cv2.INTER_LINEAR)

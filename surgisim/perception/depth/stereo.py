@@ -1,0 +1,70 @@
+"""Depth from a second, rectified view: semi-global matching.
+
+Hirschmueller, Stereo processing by semiglobal matching and mutual information, 2008, as OpenCV has it.
+"""
+
+import cv2
+import numpy as np
+
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.given import Given
+from surgisim.perception.depth.complete import complete
+from surgisim.problem import Problem
+
+NEAREST = 0.25
+"""Largest disparity looked for, as a share of the image's width."""
+
+
+def estimate(
+    rgb: np.ndarray, hidden: np.ndarray, given: Given, camera: Camera, *, distance: float
+) -> tuple[np.ndarray, np.ndarray, str]:
+    """Depth [m], confidence (T, H, W) and whether its scale is known.
+
+    rgb: left view, sRGB (T, H, W, 3) uint8. hidden: pixels that are not the tissue's own, (T, H, W) bool. Without a
+    baseline, or with a focal length that is only assumed, the median depth of frame 0 becomes `distance` [m].
+    """
+    if given.right.shape != rgb.shape:
+        raise Problem(
+            f"depth: the right view is {given.right.shape} and the left {rgb.shape}; pass views of the same frames."
+        )
+    disparity = np.stack([match(left, right) for left, right in zip(rgb, given.right, strict=True)])
+    known = disparity > 0.5
+    share = (known & ~hidden).sum() / max((~hidden).sum(), 1)
+    if share < 0.05:
+        raise Problem(
+            f"depth: only {100 * share:.0f} % of the left view is found in the right one. "
+            "Check that the two views are rectified and in order, or set depth.backend to 'near_light'."
+        )
+    z = measured(disparity, given.baseline or 1.0, camera)
+    z, trust = complete(z, known, ~hidden)
+    if given.baseline > 0 and camera.focal_from == "given":
+        return z, 0.9 * trust, "known"
+    return z * (distance / np.median(z[0][~hidden[0]] if (~hidden[0]).any() else z[0])), 0.9 * trust, "arbitrary"
+
+
+def match(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Disparity of each pixel of `left`, sRGB (H, W, 3) uint8 [px], (H, W) float32; <= 0 where not found."""
+    height, width = left.shape[:2]
+    most = max(16, 16 * round(NEAREST * width / 16))
+    block = 5
+    matcher = cv2.StereoSGBM.create(
+        minDisparity=0,
+        numDisparities=most,
+        blockSize=block,
+        P1=8 * 3 * block**2,
+        P2=32 * 3 * block**2,
+        disp12MaxDiff=1,
+        uniquenessRatio=8,
+        speckleWindowSize=max(height * width // 800, 20),
+        speckleRange=2,
+        mode=cv2.STEREO_SGBM_MODE_HH,
+    )
+    # The matcher knows nothing of the leftmost columns, where the right view may not reach.
+    pads = [np.pad(np.ascontiguousarray(v), ((0, 0), (most, 0), (0, 0)), mode="edge") for v in (left, right)]
+    found = matcher.compute(*pads)[:, most:]
+    return found.astype(np.float32) / 16
+
+
+def measured(disparity: np.ndarray, baseline: float, camera: Camera) -> np.ndarray:
+    """z [m] of a disparity [px]; 0 where there is none."""
+    return np.where(disparity > 0.5, camera.fx * baseline / np.maximum(disparity, 0.5), 0.0)

@@ -1,0 +1,1 @@
+"""What the instrument holds, from when to when, and where it carries it."""

@@ -1,0 +1,70 @@
+"""Follow points by dense flow anchored to the first frame; needs no weights.
+
+Each point rides on the dense warp of the surface around it (warp.py) and is then set to a fraction of a pixel by its
+own patch of the first frame (refine.py). Where the patch is not recognised, the warp alone carries it, and its sigma
+says so.
+"""
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+
+from surgisim.config.tracking import Tracking
+from surgisim.perception.tracking import Paths
+from surgisim.perception.tracking.refine import Templates, find, sample, templates
+from surgisim.perception.tracking.warp import Warp, follow_surface
+
+LIKE, STRANGE = 0.7, 0.2
+"""Correlation with the first frame's patch from which a point is recognised; below which it cannot be that point."""
+
+
+def track(
+    rgb: np.ndarray,
+    tool: np.ndarray,
+    specular: np.ndarray,
+    queries: np.ndarray,
+    *,
+    settings: Tracking,
+    progress: Callable[[float, float, str], None] | None = None,
+) -> Paths:
+    """Where `queries` of frame 0, (K, 2) [px], went.
+
+    rgb: sRGB, (T, H, W, 3) uint8. tool, specular: instrument and highlights, (T, H, W) bool.
+    """
+    side = max(rgb.shape[1:3])
+    hidden = np.stack([widen(mask, max(1, round(settings.margin * side))) for mask in tool])
+    radius = int(np.clip(round(settings.patch * side), 4, 12))
+    bright = hidden | np.stack([widen(mask, 1) for mask in specular])
+    patches = templates(_grey(rgb[0]), queries, bright[0], radius=radius)
+    rows = [
+        _place(patches, warp, _grey(rgb[t]), bright[t], hidden[t])
+        for t, warp in enumerate(follow_surface(rgb, hidden, progress=progress))
+    ]
+    xy, visible, sigma = (np.stack(part, 1) for part in zip(*rows, strict=True))
+    return Paths(xy.astype(np.float32), visible, sigma.astype(np.float32))
+
+
+def widen(mask: np.ndarray, by: int) -> np.ndarray:
+    """`mask` (H, W) grown by `by` px all round, bool."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * by + 1, 2 * by + 1))
+    return cv2.dilate(mask.astype(np.uint8), disc) > 0
+
+
+def _place(patches: Templates, warp: Warp, grey: np.ndarray, bright: np.ndarray, hidden: np.ndarray):
+    found = find(patches, grey, warp.position, bright)
+    error = sample(warp.error, patches.queries[:, None])[:, 0]
+    seen = sample(warp.seen.astype(np.float32), patches.queries[:, None])[:, 0] > 0.5
+    far = np.linalg.norm(found.shift, axis=-1)
+    known = (found.likeness > LIKE) & (found.sigma < 1.0) & (far < 1.0 + 3.0 * error)
+    at = patches.queries + np.where(known[:, None], found.shift, 0.0)
+    xy = sample(warp.position, at[:, None])[:, 0]
+    height, width = hidden.shape
+    inside = (xy >= 0).all(-1) & (xy[:, 0] <= width - 1) & (xy[:, 1] <= height - 1)
+    covered = sample(hidden.astype(np.float32), xy[:, None])[:, 0] > 0.25
+    visible = (known | (seen & (found.likeness > STRANGE))) & inside & ~covered
+    return xy, visible, np.where(known, np.maximum(found.sigma, 0.03), error)
+
+
+def _grey(rgb: np.ndarray) -> np.ndarray:
+    return cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY).astype(np.float32)

@@ -1,0 +1,102 @@
+"""Follow the tissue through a recording and find what carries it."""
+
+import importlib
+import sys
+from collections.abc import Callable
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.depth import Depth
+from surgisim.artifacts.frames import Frames
+from surgisim.artifacts.masks import Masks
+from surgisim.artifacts.motion import Motion
+from surgisim.artifacts.tracks import Tracks
+from surgisim.config.tracking import Tracking
+from surgisim.perception.grasp.carry import carry
+from surgisim.perception.grasp.contact import contact
+from surgisim.perception.grasp.find import Grip, find
+from surgisim.perception.grasp.given import given
+from surgisim.perception.tracking import Paths
+from surgisim.perception.tracking.lift import lift
+from surgisim.perception.tracking.points import at, shrink, spread_points
+from surgisim.problem import Problem
+
+DENSE = 2000
+"""Points followed to find a grasp and to choose from."""
+
+
+def follow(
+    frames: Frames,
+    masks: Masks,
+    depth: Depth,
+    camera: Camera,
+    settings: Tracking,
+    *,
+    progress: Callable[[float, float, str], None] | None = None,
+) -> tuple[Tracks, Motion]:
+    """Tissue tracks and the grasp of one recording."""
+    rgb = frames.rgb
+    for name, shape in (("masks", masks.tool.shape), ("depth", depth.z.shape)):
+        if shape != rgb.shape[:3]:
+            raise Problem(f"tracking: {name} are {shape} and frames {rgb.shape[:3]}; pass files of one clip and size.")
+    if not masks.tissue[0].any():
+        raise Problem("tracking: frame 0 shows no tissue to follow. Check masks.npz.")
+    usable = shrink(masks.tissue[0], 1) if shrink(masks.tissue[0], 1).any() else masks.tissue[0]
+    grips = given(settings.grasp, camera, masks.tissue[0] | masks.tool[0])
+    everywhere = np.ones_like(masks.tissue[0])
+    spread_count = max(DENSE, 2 * settings.points)
+    queries = spread_points(everywhere, min(spread_count, everywhere.size // 4))
+    cell = everywhere.size / len(queries)
+    paths = _backend(settings.backend)(rgb, masks.tool, masks.specular, queries, settings=settings, progress=progress)
+    source = "given" if grips else "found"
+    if not grips and settings.find_grasp:
+        grips = _found(rgb, masks, paths, max(rgb.shape[1:3]), cell)
+    motion = carry(grips, paths, depth, camera, source)
+    _say(motion, camera, settings)
+    keep = _choose(queries, usable, grips, settings)
+    if not keep.any():
+        raise Problem("tracking: the tissue of frame 0 is too small to follow a point on. Check masks.npz.")
+    chosen = Paths(paths.xy[keep], paths.visible[keep], paths.sigma[keep])
+    return lift(chosen, depth, camera), motion
+
+
+def _backend(name: str):
+    return importlib.import_module(f"surgisim.perception.tracking.{name}").track
+
+
+def _found(rgb: np.ndarray, masks: Masks, paths: Paths, side: int, cell: float) -> list[Grip]:
+    if not masks.tool.any():
+        return []
+    moved = (paths.xy - paths.xy[:, :1]).astype(float)
+    moved = median_filter(moved, size=(1, 3, 1), mode="nearest")
+    # What lies under the instrument or off the tissue from the beginning goes with its surroundings, and may count.
+    return find(paths.xy[:, 0].astype(float), moved, contact(rgb, masks.tool, paths.xy), side, cell)
+
+
+def _choose(queries: np.ndarray, usable: np.ndarray, grips: list[Grip], settings: Tracking) -> np.ndarray:
+    """Which points to keep: an even spread over the tissue, and more of them about the grips, (K,) bool."""
+    on = at(usable, queries)
+    keep = np.zeros(len(queries), bool)
+    index = np.flatnonzero(on)
+    for point in spread_points(usable, settings.points):
+        keep[index[np.argmin(((queries[index] - point) ** 2).sum(-1))]] = True
+    if grips and settings.points_near_grasp:
+        near = np.min([np.linalg.norm(queries - g.center, axis=-1) / g.radius for g in grips], axis=0)
+        rest = np.flatnonzero(on & ~keep & (near < 6))
+        keep[rest[np.argsort(near[rest], kind="stable")[: settings.points_near_grasp]]] = True
+    return keep
+
+
+def _say(motion: Motion, camera: Camera, settings: Tracking) -> None:
+    if motion.source == "none":
+        why = "no instrument was seen to hold tissue" if settings.find_grasp else "none was given and none looked for"
+        print(f"tracking: no grasp: {why}; nothing will be driven.", file=sys.stderr)
+    for active, confidence, radius in zip(motion.active, motion.confidence, motion.radius, strict=True):
+        first, last = np.flatnonzero(active)[[0, -1]]
+        print(
+            f"tracking: grasp {motion.source}: {first / camera.fps:.2f} to {last / camera.fps:.2f} s, "
+            f"radius {1e3 * radius:.1f} mm, confidence {confidence:.2f}.",
+            file=sys.stderr,
+        )
