@@ -15,10 +15,8 @@ def nearest(points: np.ndarray, k: int) -> np.ndarray:
     if not 0 < k < g:
         raise Problem(f"nearest: {k} neighbours are wanted for each of {g} points; ask for 1 to {g - 1}.")
     distance, index = cKDTree(points).query(points, k + 1)
-    # A point may find its twin at the same place before itself, so it is looked for and not assumed to come first.
-    self_found = index == np.arange(g)[:, None]
-    self_found[~self_found.any(1), -1] = True
-    order = np.lexsort((index, distance, self_found))
+    # Among points at one place each may come after others, or not at all: it is put last, and the last is dropped.
+    order = np.lexsort((index, distance, index == np.arange(g)[:, None]))
     return np.take_along_axis(index, order, 1)[:, :k]
 
 

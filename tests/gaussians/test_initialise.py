@@ -15,7 +15,7 @@ ROW, COL = np.mgrid[:H, :W]
 RGB = np.stack([np.stack([80 + COL, 60 + ROW * 2, np.full((H, W), 40 * t)], 2) for t in range(T)]).astype(np.uint8)
 Z = np.stack([0.06 + 1e-4 * COL + 1e-3 * t for t in range(T)])
 TOOL = np.zeros((T, H, W), bool)
-TOOL[0, 10:20, 10:30] = TOOL[1, 10:20, 20:40] = TOOL[2, 10:20, 25:50] = True
+TOOL[0, 10:20, 10:30] = TOOL[1, 10:24, 20:40] = TOOL[2, 10:20, 25:50] = True
 
 
 def scene(tool=TOOL, **settings):
