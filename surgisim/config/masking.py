@@ -31,7 +31,7 @@ class Masking(Settings):
     """Whether a clip in which no instrument is found is refused [yes/no]."""
     margin: Annotated[int, Field(ge=0)] = 1
     """How far around the instrument the tissue is left out too, because its outline mixes both [px]."""
-    refine: bool = True
+    refine: bool = False
     """Whether the outline is drawn to the nearest edge by GrabCut [yes/no]."""
     encoder: Path | None = None
     """SAM 2's image encoder for the backend sam2, an ONNX file [path]."""

@@ -32,14 +32,16 @@ def lit(rgb: np.ndarray) -> np.ndarray:
 
 def specular(rgb: np.ndarray, tool: np.ndarray) -> np.ndarray:
     """Highlights on tissue: bright, nearly colourless, brighter than what surrounds them, (T, H, W) bool."""
-    return np.stack([_highlights(frame) & ~held for frame, held in zip(rgb, tool, strict=True)])
+    return np.stack([highlights(frame) & ~held for frame, held in zip(rgb, tool, strict=True)])
 
 
-def _highlights(frame: np.ndarray) -> np.ndarray:
+def highlights(frame: np.ndarray) -> np.ndarray:
+    """Highlights of one frame, on tissue or not, (H, W) bool."""
     high, low = frame.max(-1).astype(np.float32), frame.min(-1).astype(np.float32)
     radius = max(frame.shape[:2]) // 16 * 2 + 1
     around = cv2.blur(low, (radius, radius))
     # White surfaces are bright and colourless too, but not against their own surroundings.
-    spots = (high > 170) & (low > 0.72 * high) & (low > around + 40)
-    spots |= low > 245
-    return cv2.dilate(spots.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool)
+    spots = (high > 180) & (low > 0.78 * high) & (low > around + 50)
+    spots |= low > 240
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    return cv2.dilate(spots.astype(np.uint8), cross).astype(bool)

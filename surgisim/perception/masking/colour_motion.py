@@ -1,8 +1,8 @@
 """The instrument by its colour, its entry from the border and its motion; no weights.
 
 Tissue is red because of blood; steel, plastic and paint are not. How red this clip's tissue is, is learned from
-the clip; then the clip's own colours of instrument and tissue, in two rounds; then evidence is shared between
-frames along the optical flow, and the outline drawn to the nearest edge.
+the clip; then the clip's own colours of instrument and tissue, in a few rounds; then evidence is shared between
+frames along the optical flow. Points marked by the user count for more than any colour.
 """
 
 import cv2
@@ -13,36 +13,44 @@ from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.given import Given
 from surgisim.config.masking import Masking
 from surgisim.perception.flow import agrees, carry, dense_flow
-from surgisim.perception.masking.appearance import features, lit
-from surgisim.perception.masking.shape import entering, snapped, solid
+from surgisim.perception.masking.appearance import features, highlights, lit
+from surgisim.perception.masking.settling import settled
+from surgisim.perception.masking.shape import bridged, entering, snapped, solid
 
 BINS = 24
 LOW, HIGH = np.array([-0.7, -1.0, 2.0]), np.array([1.2, 1.0, 5.6])
 """Range of the features that the colour tables cover."""
-ROUNDS = 2
+ROUNDS = 4
 
 
 def tool(frames: Frames, given: Given, settings: Masking, progress) -> tuple[np.ndarray, np.ndarray]:
     """Instrument pixels, and how clearly they stand out."""
     rgb, total = frames.rgb, len(frames.rgb)
-    inside = lit(rgb)
+    inside, shine = lit(rgb), np.stack([highlights(frame) for frame in rgb])
     seen = np.stack([features(frame) for frame in rgb])
-    evidence = _by_redness(seen)
     bins = _bins(seen)
-    grey = [cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY).astype(np.float32) / 255 for frame in rgb]
-    prior = evidence
-    for _ in range(ROUNDS):
-        found = _regions(grey, evidence, inside)
+    motion = _motion(rgb, progress)
+    marked = _clicks(frames.rgb.shape[:3], settings, motion)
+    prior = _by_redness(seen) + marked
+
+    def regions(evidence: np.ndarray) -> np.ndarray:
+        smooth = [settled(f, e) for f, e in zip(rgb, evidence, strict=True)]
+        whole = np.stack([solid(s > 0, p) for s, p in zip(smooth, prior, strict=True)]) & inside
+        found = entering(whole, prior, shine, marked > 6)
+        return np.stack([bridged(m, s) for m, s in zip(found, smooth, strict=True)]) & inside & (marked > -6)
+
+    evidence = prior
+    for turn in range(ROUNDS):
+        progress((0.5 + 0.4 * turn / ROUNDS) * total, total, "learning its colours")
+        found = regions(evidence)
         if not found.any():
             return found, np.zeros(total)
-        evidence = 0.6 * prior + 0.6 * _by_colour(bins, found, inside)
-    progress(0.3 * total, total, "following the instrument")
-    evidence = _shared_in_time(rgb, evidence, settings, progress)
-    found = _regions(grey, evidence, inside)
+        evidence = 0.3 * prior + _by_colour(bins, found, inside) + marked
+    evidence = _shared_in_time(evidence, motion)
+    found = regions(evidence)
     if settings.refine:
         band = max(rgb.shape[2] // 80, 2)
-        found = np.stack([snapped(frame, mask, band=band) for frame, mask in zip(rgb, found, strict=True)])
-        found = entering(np.stack([solid(m) for m in found]) & inside)
+        found = np.stack([snapped(frame, mask, band=band) for frame, mask in zip(rgb, found, strict=True)]) & inside
     return found, _confidence(evidence, found)
 
 
@@ -54,12 +62,12 @@ def _by_redness(seen: np.ndarray) -> np.ndarray:
     typical = float(np.median(blooded)) if len(blooded) else 0.3
     level = 0.4 * typical
     # Pale tissue: where most of the picture would count as instrument, only what is paler still does.
-    while (sample < level).mean() > 0.45 and level > -0.3:
+    while (sample < level).mean() > 0.3 and level > -0.3:
         level -= 0.02
     evidence = 3 * np.clip((level - red) / (0.2 * typical), -1.3, 1.3)
     # Burnt-out white has lost its colour, and black never had any.
     brightness = np.exp(seen[..., 2]) - 8
-    return evidence * np.clip((brightness - 8) / 24, 0.1, 1) * np.where(brightness > 250, 0.3, 1)
+    return evidence * np.clip((brightness - 4) / 16, 0.1, 1) * np.where(brightness > 240, 0.2, 1)
 
 
 def _bins(seen: np.ndarray) -> np.ndarray:
@@ -77,51 +85,40 @@ def _by_colour(bins: np.ndarray, found: np.ndarray, inside: np.ndarray) -> np.nd
     return np.clip(ratio, -4, 4)[bins].astype(np.float32)
 
 
-def _regions(grey: list[np.ndarray], evidence: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    smooth = (edge_aware(g, e, radius=2) for g, e in zip(grey, evidence, strict=True))
-    return entering(np.stack([solid(s > 0) for s in smooth]) & inside)
+def _motion(rgb: np.ndarray, progress) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Flow t -> t + 1 and t + 1 -> t for each t [px]."""
+    pairs = []
+    for t in range(len(rgb) - 1):
+        progress(0.5 * t, len(rgb), "following what moves")
+        pairs.append((dense_flow(rgb[t], rgb[t + 1]), dense_flow(rgb[t + 1], rgb[t])))
+    return pairs
 
 
-def edge_aware(guide: np.ndarray, values: np.ndarray, *, radius: int, softness: float = 1e-3) -> np.ndarray:
-    """`values` smoothed, but not across edges of `guide`, (H, W).
-
-    He, Sun and Tang, Guided image filtering, ECCV 2010.
-    """
-    mean = lambda a: cv2.blur(a, (2 * radius + 1, 2 * radius + 1))  # noqa: E731
-    guide_mean, values_mean = mean(guide), mean(values)
-    slope = (mean(guide * values) - guide_mean * values_mean) / (mean(guide * guide) - guide_mean**2 + softness)
-    return mean(slope) * guide + mean(values_mean - slope * guide_mean)
-
-
-def _shared_in_time(rgb, evidence: np.ndarray, settings: Masking, progress) -> np.ndarray:
-    """Evidence averaged with that of the neighbouring frames along the flow, clicks put in and carried on."""
-    marked = _clicks(evidence.shape, settings)
-    total = len(rgb)
+def _shared_in_time(evidence: np.ndarray, motion: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Evidence averaged with that of the neighbouring frames where the flow can be trusted, (T, H, W)."""
     summed, weight = evidence.copy(), np.ones_like(evidence)
-    forward = backward = marked.copy()
-    backward = marked.copy()
-    steps = []
-    for t in range(total - 1):
-        there, back = dense_flow(rgb[t], rgb[t + 1]), dense_flow(rgb[t + 1], rgb[t])
-        steps.append((there, back))
+    for t, (there, back) in enumerate(motion):
         for a, b, way, other in ((t, t + 1, there, back), (t + 1, t, back, there)):
-            trusted = 0.6 * agrees(way, other)
+            trusted = 0.3 * agrees(way, other)
             summed[a] += trusted * carry(evidence[b], way)
             weight[a] += trusted
-        forward[t + 1] = np.where(forward[t + 1] == 0, 0.97 * carry(forward[t], back), forward[t + 1])
-        progress((0.3 + 0.5 * t / total) * total, total, "following the instrument")
-    for t in reversed(range(total - 1)):
-        backward[t] = np.where(backward[t] == 0, 0.97 * carry(backward[t + 1], steps[t][0]), backward[t])
-    return summed / weight + forward + backward
+    return summed / weight
 
 
-def _clicks(shape: tuple[int, ...], settings: Masking) -> np.ndarray:
-    """Strong evidence in a small disc around each marked point, (T, H, W)."""
+def _clicks(shape: tuple[int, ...], settings: Masking, motion: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Strong evidence in a small disc around each marked point, carried to the other frames, fading, (T, H, W)."""
     marked = np.zeros(shape, np.float32)
+    if not settings.clicks:
+        return marked
     for click in settings.clicks:
         sign = 12.0 if click.label == "tool" else -12.0
         cv2.circle(marked[click.frame], (round(click.x), round(click.y)), max(shape[2] // 50, 3), sign, -1)
-    return marked
+    later, earlier = marked.copy(), marked.copy()
+    for t, (_, back) in enumerate(motion):
+        later[t + 1] = np.where(later[t + 1] == 0, 0.97 * carry(later[t], back), later[t + 1])
+    for t, (there, _) in reversed(list(enumerate(motion))):
+        earlier[t] = np.where(earlier[t] == 0, 0.97 * carry(earlier[t + 1], there), earlier[t])
+    return np.where(marked != 0, marked, later + earlier)
 
 
 def _confidence(evidence: np.ndarray, found: np.ndarray) -> np.ndarray:

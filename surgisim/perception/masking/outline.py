@@ -33,7 +33,7 @@ def masks(frames: Frames, given: Given, settings: Masking, *, progress: Progress
 
 def _backend(name: str) -> Callable:
     files = [m.name for m in pkgutil.iter_modules(masking.__path__)]
-    known = [f for f in files if f not in ("appearance", "outline", "shape")]
+    known = [f for f in files if f not in ("appearance", "outline", "settling", "shape")]
     if name not in known:
         raise Problem(
             f"config key 'masking.backend' is '{name}', and surgisim/perception/masking/ holds {sorted(known)}. "

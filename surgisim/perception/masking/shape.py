@@ -4,24 +4,38 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
+CLEAR = 3.2
+"""Evidence (3.9 at most) that a quarter of an instrument's colours exceed: steel is not faintly grey."""
 
-def entering(found: np.ndarray) -> np.ndarray:
+
+def entering(found: np.ndarray, evidence: np.ndarray, highlight: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """Those regions of `found` that are, through space and time, one thing entering from the border, (T, H, W) bool.
 
     A region may lose contact for some frames (a jaw in front of its reddish wrist); what counts is that it is
     one with a region that has it. Tissue of an unusual colour at the border lies along it and stays; an
-    instrument reaches in, or moves.
+    instrument reaches in, or moves. `evidence` is that of the colour alone, `highlight` where the lamp is reflected;
+    a region holding a `chosen` pixel is kept whatever it looks like.
     """
     count, height, width = found.shape
     label, number = ndimage.label(found, ndimage.generate_binary_structure(3, 2))
     inward = _inward(height, width)
     kept = np.zeros(number + 1, bool)
     for index, part in enumerate(ndimage.find_objects(label), 1):
-        kept[index] = _is_instrument(label[part] == index, inward[part[1:]], count, height * width)
-    return kept[label]
+        region = label[part] == index
+        clear = np.quantile(evidence[part][region], 0.75) > CLEAR and highlight[part][region].mean() < 0.85
+        kept[index] = clear and _is_instrument(region, inward[part[1:]], count, (height, width))
+    kept[np.unique(label[chosen])] = True
+    kept[0] = False
+    return np.stack(
+        [
+            _without_islands(m, e, h, inward, c)
+            for m, e, h, c in zip(kept[label], evidence, highlight, chosen, strict=True)
+        ]
+    )
 
 
-def _is_instrument(region: np.ndarray, inward: np.ndarray, count: int, pixels: int) -> bool:
+def _is_instrument(region: np.ndarray, inward: np.ndarray, count: int, size: tuple[int, int]) -> bool:
+    pixels = size[0] * size[1]
     area = region.sum((1, 2))
     if area.max() < 0.003 * pixels or area.sum() < 0.0005 * pixels * count:
         return False
@@ -30,11 +44,28 @@ def _is_instrument(region: np.ndarray, inward: np.ndarray, count: int, pixels: i
     touching = contact > 0
     if not touching.any():
         return False
-    reaches = np.median(depth[touching] / contact[touching]) > 0.6
-    seen = area > 0.2 * area.max()
-    ever, always = region.any(0).sum(), region[seen].mean(0)
-    moves = (always > 0.8).sum() < 0.5 * ever
+    reaches = np.median(depth[touching] / contact[touching]) > 0.6 or depth.max() > 0.25 * min(size)
+    present = area > 0.2 * area.max()
+    always = region[present].mean(0) > 0.8
+    moves = always.sum() < 0.3 * region.any(0).sum() and depth.max() > 0.08 * min(size)
     return bool(reaches or moves)
+
+
+def _without_islands(mask, evidence, highlight, inward, chosen) -> np.ndarray:
+    """Takes out pieces that neither reach the border nor lie beside one that does, unless large and dull, (H, W)."""
+    number, label, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    area = np.maximum(stats[:, 4], 1)
+    shine = np.bincount(label.ravel(), highlight.ravel(), number) / area
+    clear = np.bincount(label.ravel(), evidence.ravel(), number) / area
+    contact = np.bincount(label.ravel(), (inward <= 2).ravel(), number) > 0
+    kept = contact | ((area > 0.002 * mask.size) & ((shine < 0.6) | (clear > 1.5)))
+    kept |= np.bincount(label.ravel(), chosen.ravel(), number) > 0
+    kept[0] = False
+    gap = 2 * max(mask.shape[1] // 80, 2) + 1
+    beside = cv2.dilate(kept[label].astype(np.uint8), np.ones((gap, gap), np.uint8))
+    kept |= (clear > 1) & (np.bincount(label.ravel(), beside.ravel(), number) > 0)
+    kept[0] = False
+    return kept[label]
 
 
 def _inward(height: int, width: int) -> np.ndarray:
@@ -43,18 +74,33 @@ def _inward(height: int, width: int) -> np.ndarray:
     return np.minimum(np.minimum(x, width - 1 - x), np.minimum(y, height - 1 - y))
 
 
-def solid(mask: np.ndarray) -> np.ndarray:
-    """The mask with cracks closed, specks taken out and small holes filled, (H, W) bool."""
+def solid(mask: np.ndarray, evidence: np.ndarray) -> np.ndarray:
+    """The mask with cracks closed, specks taken out, and small holes filled that do not show tissue, (H, W) bool."""
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     pixels = mask.size
     _, label, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=8)
-    grain = stats[:, 4] < 0.0008 * pixels
+    grain = stats[:, 4] < 0.0004 * pixels
     grain[0] = False
     closed[grain[label]] = 0
-    _, label, stats, _ = cv2.connectedComponentsWithStats(1 - closed, connectivity=4)
-    hole = stats[:, 4] < 0.006 * pixels
+    number, label, stats, _ = cv2.connectedComponentsWithStats(1 - closed, connectivity=4)
+    area = np.maximum(stats[:, 4], 1)
+    unclear = np.bincount(label.ravel(), evidence.ravel(), number) / area > -2
+    hole = (area < 0.0004 * pixels) | ((area < 0.01 * pixels) & unclear)
     hole[0] = False
     return closed.astype(bool) | hole[label]
+
+
+def bridged(mask: np.ndarray, evidence: np.ndarray) -> np.ndarray:
+    """The mask with the gaps between an instrument's parts filled unless they clearly show tissue, (H, W) bool.
+
+    Polished parts mirror the tissue; what lies between two parts of an instrument is mostly instrument too.
+    """
+    radius = max(round(0.03 * mask.shape[1]), 2)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+    padded = np.pad(mask.astype(np.uint8), radius + 1, mode="edge")
+    inside = slice(radius + 1, -radius - 1)
+    closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, disc)[inside, inside].astype(bool)
+    return mask | (closed & (evidence > -3.5))
 
 
 def snapped(frame: np.ndarray, mask: np.ndarray, *, band: int) -> np.ndarray:
