@@ -1,7 +1,7 @@
 """What every group of settings shares."""
 
 import difflib
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -33,9 +33,17 @@ def parse(kind: type[S], raw: dict[str, Any], where: str) -> S:
 
 
 def _fields(kind: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
+    """Keys that would have been right at `path`, through lists and tagged unions."""
+    here = [kind]
     for part in path:
-        field = kind.model_fields.get(part)
-        if field is None or not (isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)):
-            break
-        kind = field.annotation
-    return list(kind.model_fields)
+        if isinstance(part, int):
+            continue
+        tagged = [k for k in here if any(part in get_args(f.annotation) for f in k.model_fields.values())]
+        here = tagged or [m for k in here if part in k.model_fields for m in _models(k.model_fields[part].annotation)]
+    return [name for k in here for name in k.model_fields]
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [m for inner in get_args(annotation) for m in _models(inner)]

@@ -1,0 +1,145 @@
+"""Parameters are planted, forgotten and found again; and what a clip cannot tell is said."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from slab import pulled, slab
+
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.frames import Frames
+from surgisim.artifacts.masks import Masks
+from surgisim.artifacts.scene import Scene
+from surgisim.artifacts.tracks import Tracks
+from surgisim.config.estimation import Estimation
+from surgisim.estimation.fit import _windows, estimate
+from surgisim.estimation.observation import PHASES, phases
+from surgisim.estimation.search import search
+from surgisim.mpm.grip import drive
+from surgisim.mpm.setup import prepare
+from surgisim.problem import Problem
+
+FPS, T = 25.0, 24
+CAMERA = Camera(64, 48, 80.0, 80.0, 31.5, 23.5, FPS, T, "known", "given", "slab", [64, 48], [0, 0, 64, 48])
+TRUE = {"corotated": {"E": 900.0, "nu": 0.38}, "newtonian": {"eta": 1.2}}
+QUICK = {"field_iterations": 0, "image_weight": 0.0, "iterations": 5}
+
+
+def silent(*_):
+    pass
+
+
+def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, seed=0):
+    """What the stages before would hand over, made with `values` and then forgotten."""
+    body, motion = slab(), motion or pulled(frames=T, hold=9)
+    made = prepare(body, tuple(values), values, density=1050.0)
+    theta = made.theta(values)
+    if stiff is not None:
+        theta[:, 0] *= stiff(body.rest)
+    per_frame = 2 * made.per_frame(
+        {**values, "corotated": {"E": theta[:, 0].max(), "nu": values["corotated"]["nu"]}}, FPS
+    )
+    run = made.simulator.run(theta, drive(motion, body.rest, body.held, fps=FPS, per_frame=per_frame))
+    points = body.rest[body.surface].astype(float)
+    rng = np.random.default_rng(seed)
+    carry = made.simulator.carry(points)
+    xyz = np.stack([points + carry @ u.astype(float) for u in run.u], 1)
+    xyz = xyz + np.where(np.arange(T)[:, None] > 0, rng.normal(0, noise, xyz.shape), 0.0)
+    k = xyz.shape[:2]
+    tracks = Tracks(
+        CAMERA.project(xyz).astype(np.float32), np.ones(k, bool), np.full(k, 0.1, np.float32), xyz.astype(np.float32),
+        np.full((*k, 2), max(noise, 1e-5), np.float32),
+    )  # fmt: skip
+    split = np.zeros(T, np.uint8)
+    split[1::8], split[-3:] = 1, 2
+    rgb = np.zeros((T, 48, 64, 3), np.uint8)
+    some = np.zeros((T, 48, 64), bool)
+    g = len(points)
+    scene = Scene(points, np.zeros(g), np.full((g, 3), -6.5), np.tile([1.0, 0, 0, 0], (g, 1)), np.full((g, 3), 0.5))
+    return body, scene, tracks, motion, Frames(rgb, split), Masks(some, ~some, some, np.ones(T, np.float32)), CAMERA
+
+
+def test_planted_parameters_are_found_from_a_pull_and_its_release():
+    _, physics, fit = estimate(*clip(), Estimation(**QUICK), silent)
+    E, nu = (physics.terms["corotated"][p]["value"] for p in ("E", "nu"))
+    eta = physics.terms["newtonian"]["eta"]["value"]
+    assert eta / E == pytest.approx(1.2 / 900.0, rel=0.2)
+    assert pytest.approx(900.0, rel=0.2) == E
+    assert nu == pytest.approx(0.38, abs=0.02)
+    assert fit.held_out["fitted"] < 0.5 * fit.held_out["default"]
+    assert fit.identifiability["newtonian.eta / corotated.E"]["told"]
+
+
+def test_a_pull_without_a_release_cannot_tell_the_modulus():
+    slow = pulled(frames=T, hold=T)
+    _, _, fit = estimate(*clip(motion=slow, noise=1e-4), Estimation(**QUICK), silent)
+    release = fit.identifiability["corotated.E"]["phases"]["release"]
+    assert release == 0
+    assert not fit.identifiability["corotated.E"]["told"]
+    assert "cannot tell" in fit.words
+
+
+def test_without_a_grip_nothing_is_fitted_and_the_fit_says_so():
+    case = list(clip())
+    motion = case[3]
+    case[3] = type(motion)(
+        np.zeros((0, 3)), np.zeros(0), np.zeros((0, T, 3)), np.zeros((0, T), bool), np.zeros(0), "none"
+    )
+    _, physics, fit = estimate(*case, Estimation(**QUICK), silent)
+    assert physics.terms["corotated"]["E"]["value"] == 3000.0
+    assert "cannot be learned" in fit.words
+
+
+def test_a_grip_that_never_moves_teaches_nothing():
+    case = list(clip())
+    case[3] = replace(case[3], position=np.repeat(case[3].position[:, :1], T, 1))
+    assert "no motion to learn" in estimate(*case, Estimation(**QUICK), silent)[2].words
+
+
+def test_frames_held_out_are_never_looked_at():
+    case = clip()
+    first = estimate(*case, Estimation(**QUICK), silent)
+    blind = list(case)
+    xyz = case[2].xyz.copy()
+    xyz[:, case[4].split > 0] += 0.01
+    blind[2] = replace(case[2], xyz=xyz)
+    second = estimate(*blind, Estimation(**QUICK), silent)
+    assert np.array_equal(first[0].values, second[0].values)
+
+
+def test_a_stiff_half_is_found_by_the_refinement():
+    def stiff(rest):
+        return np.where(rest[:, 0] > 0, 2.0, 0.7)
+
+    settings = Estimation(**{**QUICK, "field_iterations": 15, "smoothness": 0.3, "field": ["corotated.E"]})
+    material, _, fit = estimate(*clip(stiff=stiff, noise=1e-5), settings, silent)
+    right = slab().rest[:, 0] > 0
+    E = material.values[:, 0]
+    assert fit.held_out["field_kept"]
+    assert E[right].mean() > 1.15 * E[~right].mean()
+
+
+def test_rounds_double_so_that_their_sum_stays_below_twice_the_clip():
+    for frames in (24, 100, 400):
+        motion = pulled(frames=frames, hold=9)
+        windows = _windows(motion, np.arange(1, frames), 0.25)
+        assert windows[-1] == frames - 1
+        assert sum(windows) <= 2 * frames
+        assert all(b > a for a, b in itertools.pairwise(windows))
+
+
+def test_phases_follow_the_grip():
+    phase = [PHASES[k] for k in phases(pulled(frames=16, hold=9), 16)]
+    assert phase[2] == "load"
+    assert phase[8] == "hold"
+    assert phase[10:] == ["release"] * 6
+
+
+@pytest.mark.parametrize(
+    ("start", "fixed", "said"),
+    [({"corotated": {"E": 1.0}}, [], "outside 100"), ({}, ["corotated.G"], "no parameter of the chosen laws")],
+)
+def test_a_start_that_does_not_exist_or_fit_is_refused(start, fixed, said):
+    with pytest.raises(Problem, match=said):
+        search(["corotated"], start, fixed)
