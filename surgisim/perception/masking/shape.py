@@ -5,7 +5,7 @@ import numpy as np
 from scipy import ndimage
 
 CLEAR = 3.2
-"""Evidence (3.9 at most) that a quarter of an instrument's colours exceed: steel is not faintly grey."""
+"""Evidence (3.9 at most) that a quarter of an instrument's own colours exceed: steel is not faintly grey."""
 
 
 def entering(found: np.ndarray, evidence: np.ndarray, highlight: np.ndarray, chosen: np.ndarray) -> np.ndarray:
@@ -22,7 +22,7 @@ def entering(found: np.ndarray, evidence: np.ndarray, highlight: np.ndarray, cho
     kept = np.zeros(number + 1, bool)
     for index, part in enumerate(ndimage.find_objects(label), 1):
         region = label[part] == index
-        clear = np.quantile(evidence[part][region], 0.75) > CLEAR and highlight[part][region].mean() < 0.85
+        clear = _is_clear(evidence[part][region]) and highlight[part][region].mean() < 0.85
         kept[index] = clear and _is_instrument(region, inward[part[1:]], count, (height, width))
     kept[np.unique(label[chosen])] = True
     kept[0] = False
@@ -32,6 +32,12 @@ def entering(found: np.ndarray, evidence: np.ndarray, highlight: np.ndarray, cho
             for m, e, h, c in zip(kept[label], evidence, highlight, chosen, strict=True)
         ]
     )
+
+
+def _is_clear(evidence: np.ndarray) -> bool:
+    """Whether enough of a region is clearly not tissue; the rest may mirror it, or be blurred into it."""
+    apart = evidence[evidence > 0]
+    return len(apart) > 0.3 * len(evidence) and bool(np.quantile(apart, 0.75) > CLEAR)
 
 
 def _is_instrument(region: np.ndarray, inward: np.ndarray, count: int, size: tuple[int, int]) -> bool:
@@ -58,7 +64,7 @@ def _without_islands(mask, evidence, highlight, inward, chosen) -> np.ndarray:
     shine = np.bincount(label.ravel(), highlight.ravel(), number) / area
     clear = np.bincount(label.ravel(), evidence.ravel(), number) / area
     contact = np.bincount(label.ravel(), (inward <= 2).ravel(), number) > 0
-    kept = contact | ((area > 0.002 * mask.size) & ((shine < 0.6) | (clear > 1.5)))
+    kept = contact | ((area > 0.002 * mask.size) & (shine < 0.6))
     kept |= np.bincount(label.ravel(), chosen.ravel(), number) > 0
     kept[0] = False
     gap = 2 * max(mask.shape[1] // 80, 2) + 1
