@@ -36,6 +36,10 @@ def rasterise(
                 f"rasterise: engine gsplat wants float32 on a CUDA device and was given {tensor.dtype} on "
                 f"{tensor.device}."
             )
+    if len(mean) == 0:
+        # gsplat's kernels end the process when there is nothing to draw.
+        nothing = mean.new_zeros(camera.height, camera.width) + color.sum()
+        return nothing[..., None] + mean.new_tensor(background), nothing, nothing, mean.new_zeros(0)
     attributes = mean, rotation, scale, opacity
     image, alpha, facts = _draw(*attributes, color, camera, background, near, "RGB+D")
     if probe.requires_grad and facts["means2d"].requires_grad:

@@ -108,11 +108,12 @@ def test_the_probe_says_how_a_shift_of_the_centre_in_pixels_changes_the_loss():
 
 
 @pytest.mark.skipif(bool(lacking()), reason=f"gsplat needs {lacking()}")
-def test_the_cuda_engine_agrees_with_the_twin():
+@pytest.mark.parametrize("count", [0, 200])
+def test_the_cuda_engine_agrees_with_the_twin(count):
     view = camera(61, 47)
-    scene = cloud(200, view, seed=2)
+    scene = [t[:count] for t in cloud(200, view, seed=2)]
     scene[3] = scene[3] * 0.9
     fast = gradients(scene, view, "gsplat", torch.float32, device="cuda")
     slow = gradients(scene, view, "twin", torch.float64)
     for name in fast:
-        assert distance(fast[name], slow[name]) < TOLERANCE["differences"], name
+        assert count == 0 or distance(fast[name], slow[name]) < TOLERANCE["cuda"], name
