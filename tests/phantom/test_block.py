@@ -54,6 +54,8 @@ def test_the_field_around_the_grip_converges():
         pull = np.array([0.003, 0.0, -0.003])
         drive = Drive(lambda t, pull=pull: ease(t / 0.12)[:, None] * pull, -1.0, 9.0)
         moved = march(block, elements(block.points, block.cells, law), drive, np.linspace(0, 0.2, 6))[-1]
+        assert np.allclose((moved - block.points)[block.gripped], pull, atol=1e-12)
+        assert not (moved - block.points)[block.fixed].any()
         upper = np.abs(block.points[:, 2] - 0.07) < 1e-9
         fields.append(LinearNDInterpolator(block.points[upper, :2], (moved - block.points)[upper])(probe))
     size, gap = (np.sqrt((f**2).sum(-1).mean()) for f in (fields[1], fields[0] - fields[1]))
