@@ -5,7 +5,7 @@ import torch
 from surgisim.artifacts.camera import Camera
 
 TOLERANCE = {"forward": 1e-6, "backward": 5e-6, "cuda": 1e-3, "differences": 1e-2}
-"""Relative L2 norm of float32 against float64 (CUDA's exponential is a fast one), and against differences of float32."""
+"""Relative L2 norm of float32 against float64 (CUDA takes a fast exponential), and against its own differences."""
 NAMES = ("mean", "rotation", "scale", "opacity", "color")
 
 
