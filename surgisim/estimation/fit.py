@@ -5,6 +5,7 @@ window is twice the last, so all rounds together cost at most twice the last one
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -19,13 +20,12 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
-from surgisim.estimation.gauss_newton import gauss_newton
+from surgisim.estimation.gauss_newton import gauss_newton, scan
 from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
 from surgisim.estimation.picture import picture_loss
 from surgisim.estimation.refine import refine
 from surgisim.estimation.search import Search, search
-from surgisim.mpm.grip import drive
 from surgisim.mpm.setup import Prepared, Values, prepare
 from surgisim.mpm.simulator import Breakdown
 from surgisim.physics.catalogue import choose, columns
@@ -57,7 +57,7 @@ def estimate(
     carried = np.concatenate([scene.mean, tracks.xyz[:, 0][np.isfinite(tracks.xyz[:, 0]).all(1)]]).astype(float)
     bodies = [
         prepare(
-            body, tuple(settings.terms), wanted.values(wanted.start), density=settings.density,
+            body, tuple(settings.terms), density=settings.density,
             gravity=settings.gravity, carried=carried, device=settings.device,
         )
         for _ in range(WORKERS)
@@ -79,7 +79,7 @@ def estimate(
         values = wanted.values(x)
         prepared = bodies[worker]
         per_frame = prepared.per_frame(values, camera.fps, SAFETY)
-        path = drive(motion, body.rest, body.held, fps=camera.fps, per_frame=per_frame, frames=total)
+        path = prepared.drive(motion, values, fps=camera.fps, per_frame=per_frame, frames=total)
         return prepared.simulator.run(prepared.theta(values), path, last=last)
 
     default = simulate(wanted.start, 0, total - 1)
@@ -87,30 +87,37 @@ def estimate(
     x, history = wanted.start, []
     if settings.enabled and wanted.free:
         windows = _windows(motion, fitted, settings.first_window)
-        for number, last in enumerate(windows):
-            inside = fitted[fitted <= last]
 
-            def residual(x, worker, inside=inside, last=last):
-                try:
-                    run = simulate(x, worker, last)
-                except Breakdown:
-                    return None
-                return observation.residual(run.u, inside).ravel()
+        def residual(x, worker, last=int(fitted[-1])):
+            try:
+                run = simulate(x, worker, last)
+            except Breakdown:
+                return None
+            return observation.residual(run.u, fitted[fitted <= last]).ravel()
+
+        points = wanted.starts()
+        progress(0.02, 1.0, f"trying {len(points)} starts")
+        x, costs = scan(residual, points, prior=wanted.start, spread=wanted.spread, share=INDEPENDENT, workers=WORKERS)
+        for point, cost in zip(points, costs, strict=True):
+            tried = dict(zip(wanted.names, _plain(wanted, point), strict=True))
+            history.append({"round": "scan", "cost": _number(cost)} | tried)
+        for number, last in enumerate(windows):
 
             def said(iteration, x, cost, number=number, last=last):
                 values = {n: float(f"{v:.4g}") for n, v in zip(wanted.names, _plain(wanted, x), strict=True)}
                 history.append(
                     {"round": number, "last_frame": int(last), "iteration": iteration, "cost": cost, **values}
                 )
-                done = (number + iteration / settings.iterations) / len(windows)
-                progress(0.7 * done, 1.0, f"round {number + 1}/{len(windows)}, iteration {iteration}: {values}")
+                done = 0.2 + 0.5 * (number + iteration / settings.iterations) / len(windows)
+                progress(done, 1.0, f"round {number + 1}/{len(windows)}, iteration {iteration}: {values}")
 
             solution = gauss_newton(
-                residual, x, prior=wanted.start, spread=wanted.spread, bounds=wanted.bounds,
+                partial(residual, last=last), x, prior=wanted.start if last == fitted[-1] else x,
+                spread=wanted.spread, bounds=wanted.bounds,
                 share=INDEPENDENT, iterations=settings.iterations, workers=WORKERS, said=said,
             )  # fmt: skip
             x = solution.x
-        phase_of = np.broadcast_to(phase[inside][None, :, None], (len(observation.rest), len(inside), 3)).ravel()
+        phase_of = np.broadcast_to(phase[fitted][None, :, None], (len(observation.rest), len(fitted), 3)).ravel()
         thickness = float(np.ptp(body.rest[:, 2]))
         table = identifiability(
             solution, wanted, phase_of=phase_of, phase_names=PHASES, density=settings.density, length=thickness,
@@ -126,7 +133,7 @@ def estimate(
     chosen = [names.index(n) for n in settings.field if n in names and n in wanted.names]
     if settings.enabled and settings.field_iterations and chosen:
         per_frame = prepared.per_frame(values, camera.fps, SAFETY / 1.5)
-        path = drive(motion, body.rest, body.held, fps=camera.fps, per_frame=per_frame, frames=int(fitted[-1]) + 1)
+        path = prepared.drive(motion, values, fps=camera.fps, per_frame=per_frame, frames=int(fitted[-1]) + 1)
         judge, train = fitted[2::4], np.setdiff1d(fitted, fitted[2::4])
         shown = np.sort(np.random.default_rng(settings.seed).permutation(train)[: settings.image_frames])
         image = (
@@ -146,7 +153,7 @@ def estimate(
     top = {n: float(theta[:, k].max()) for k, n in enumerate(names)}
     stiffest = {law: {p: top[f"{law}.{p}"] for p in t.params} for law, t in choose(prepared.terms).items()}
     per_frame = prepared.per_frame(stiffest, camera.fps, SAFETY)
-    path = drive(motion, body.rest, body.held, fps=camera.fps, per_frame=per_frame, frames=total)
+    path = prepared.drive(motion, values, fps=camera.fps, per_frame=per_frame, frames=total)
     final = prepared.simulator.run(theta, path)
     after = observation.error(final.u, held_out)
     progress(1.0, 1.0, f"held-out track error {after * 1e3:.3f} mm ({before * 1e3:.3f} mm with default parameters)")

@@ -107,6 +107,32 @@ def gauss_newton(
     return Solution(x, r, J, history)
 
 
+def scan(
+    residual: Callable[[np.ndarray, int], np.ndarray | None],
+    points: list[np.ndarray],
+    *,
+    prior: np.ndarray,
+    spread: np.ndarray,
+    share: float,
+    workers: int,
+) -> tuple[np.ndarray, list[float]]:
+    """The best of a few starting points, and the cost at each (infinite where it cannot be simulated).
+
+    A ring-down misfits by whole periods: from a modulus a few times too high, a descent ends there.
+    """
+
+    def costs(mine: list[np.ndarray], worker: int) -> list[float]:
+        results = ((x, residual(x, worker)) for x in mine)
+        return [np.inf if r is None else _cost(r, x, prior, spread, share) for x, r in results]
+
+    with ThreadPoolExecutor(workers) as pool:
+        jobs = [pool.submit(costs, points[w::workers], w) for w in range(workers)]
+        all_costs = [np.inf] * len(points)
+        for w, job in enumerate(jobs):
+            all_costs[w::workers] = job.result()
+    return points[int(np.argmin(all_costs))], all_costs
+
+
 def _in_turn(residual, points, worker):
     return [residual(x, worker) for x in points]
 

@@ -34,6 +34,8 @@ class Observation:
 
     def error(self, u: np.ndarray, frames: np.ndarray) -> float:
         """Median distance between simulated and seen points at `frames` [m]; NaN if none is seen."""
+        if not len(frames):
+            return float("nan")
         simulated = np.stack([self.carry @ u[t].astype(float) for t in frames], 1)
         seen = self.weight[:, frames].any(-1)
         distance = np.linalg.norm(simulated - self.displacement[:, frames], axis=-1)[seen]

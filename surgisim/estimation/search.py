@@ -10,6 +10,8 @@ from surgisim.problem import Problem
 
 PRIOR_LOG = 1.5
 """Standard deviation of the prior on a logarithm: tissue moduli spread over a factor 4-5 either way."""
+FIRST_STEPS, SECOND_STEPS = (-2.4, -1.6, -0.8, 0.0, 0.8), (-1.2, 0.0, 1.2)
+"""Offsets of the first two logarithms in the scan that precedes the descent."""
 PRIOR_SHARE = 0.3
 """The same for a plain parameter, as a share of its range."""
 
@@ -42,6 +44,15 @@ class Search:
         ends = [(_forward(p, p.low), _forward(p, p.high)) for *_, p in self.free]
         low, high = np.array(ends).reshape(-1, 2).T
         return low, high
+
+    def starts(self) -> list[np.ndarray]:
+        """Points to try first: the start, and up to two logarithms stepped around it."""
+        low, high = self.bounds
+        steps = [np.zeros(len(self.free))]
+        logarithmic = [k for k, (*_, p) in enumerate(self.free) if p.logarithmic]
+        for k, offsets in zip(logarithmic, (FIRST_STEPS, SECOND_STEPS), strict=False):
+            steps = [s + o * np.eye(len(self.free))[k] for s in steps for o in offsets]
+        return [np.clip(self.start + s, low, high) for s in steps]
 
     def values(self, x: np.ndarray) -> Values:
         """Law -> parameter -> value at x."""

@@ -8,6 +8,11 @@ from scipy.interpolate import PchipInterpolator
 from surgisim.artifacts.motion import Motion
 from surgisim.problem import Problem
 
+ANCHOR = 4.0
+"""Spring of an anchor, in units of (wave speed / spacing)^2 per unit of mass: as stiff as a cell of the tissue
+itself, so that its own compliance shrinks with the grid. It has no damper: at the held boundary that would
+drain every wave that arrives there."""
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -23,6 +28,8 @@ class Drive:
     """[s]"""
     per_frame: int
     """Steps between two frames."""
+    stiffness: float
+    """Spring that holds a particle to its anchor, per unit of mass [1/s^2]."""
 
     @property
     def steps(self) -> int:
@@ -35,7 +42,14 @@ class Drive:
 
 
 def drive(
-    motion: Motion, rest: np.ndarray, held: np.ndarray, *, fps: float, per_frame: int, frames: int | None = None
+    motion: Motion,
+    rest: np.ndarray,
+    held: np.ndarray,
+    *,
+    fps: float,
+    per_frame: int,
+    stiffness: float,
+    frames: int | None = None,
 ) -> Drive:
     """The boundary condition of a replay of `motion` on particles `rest` [m], (P, 3).
 
@@ -70,4 +84,4 @@ def drive(
         on = motion.active[j].astype(bool)
         frame = np.minimum(np.arange(steps) // per_frame, len(on) - 1)
         active[1 + j] = on[frame] & on[np.minimum(frame + 1, len(on) - 1)]
-    return Drive(member, path, active, step, per_frame)
+    return Drive(member, path, active, step, per_frame, stiffness)

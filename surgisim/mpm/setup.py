@@ -7,9 +7,11 @@ import numpy as np
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.material import Material
+from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.physics import Physics
 from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
+from surgisim.mpm.grip import ANCHOR, Drive, drive
 from surgisim.mpm.simulator import Simulator
 from surgisim.mpm.stable import check_step, largest_step, wave_speed
 from surgisim.physics.catalogue import choose, columns
@@ -26,6 +28,7 @@ class Prepared:
     terms: tuple[str, ...]
     density: float
     """[kg/m^3]"""
+    body: Body
 
     def theta(self, values: Values) -> np.ndarray:
         """One number a parameter as one row a particle, (P, M)."""
@@ -37,11 +40,20 @@ class Prepared:
         largest = largest_step(choose(self.terms), values, self.density, self.simulator.grid.spacing)
         return max(1, math.ceil(1 / fps / (largest * safety)))
 
+    def drive(
+        self, motion: Motion, values: Values, *, fps: float, per_frame: int, frames: int | None = None, held=None
+    ) -> Drive:
+        """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values`."""
+        rate = wave_speed(choose(self.terms), values, self.density) / self.simulator.grid.spacing
+        held = self.body.held if held is None else held
+        return drive(
+            motion, self.body.rest, held, fps=fps, per_frame=per_frame, frames=frames, stiffness=ANCHOR * rate**2
+        )
+
 
 def prepare(
     body: Body,
     terms: tuple[str, ...],
-    values: Values,
     *,
     density: float,
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -57,12 +69,11 @@ def prepare(
         density=density,
         grid=Grid.around(points, body.spacing),
         terms=terms,
-        wave_speed=wave_speed(choose(terms), values, density),
         gravity=gravity,
         cut=cut,
         device=device,
     )
-    return Prepared(simulator, tuple(terms), density)
+    return Prepared(simulator, tuple(terms), density, body)
 
 
 def values_of(physics: Physics) -> Values:

@@ -21,10 +21,6 @@ from surgisim.problem import Problem
 
 wp.config.quiet = True
 
-ANCHOR_STIFFNESS = 4.0
-"""Spring of an anchor, in units of (wave speed / spacing)^2 per unit of mass. It has no damper: at the
-held boundary that would drain every wave that arrives there."""
-
 NEVER = 2**31 - 1
 
 
@@ -53,12 +49,11 @@ class Simulator:
         density: float,
         grid: Grid,
         terms: tuple[str, ...],
-        wave_speed: float,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         cut: Cut | None = None,
         device: str = "cpu",
     ) -> None:
-        """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,); `wave_speed` [m/s] sets the anchors' spring."""
+        """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,)."""
         self.rest, self.grid, self.terms, self.device = np.asarray(rest, float), grid, tuple(terms), device
         self.count, self.cut = len(rest), cut
         nodes, weight, _ = self.stencil(self.rest)
@@ -84,8 +79,6 @@ class Simulator:
         self.clock = wp.zeros(2, dtype=int, device=device)
         self.trouble = put(np.array([NEVER, 0]), int)
         self.kernels = particle_kernels(self.terms)
-        rate = wave_speed / grid.spacing
-        self.stiffness = ANCHOR_STIFFNESS * rate**2
 
     # Forward
 
@@ -222,7 +215,7 @@ class Simulator:
         anchors.member = wp.array(drive.member.astype(np.int32), dtype=int, device=self.device)
         anchors.path = wp.array(drive.path.astype(np.float32), dtype=wp.vec3, device=self.device)
         anchors.active = wp.array(drive.active.astype(np.int32), dtype=int, device=self.device)
-        anchors.stiffness = float(self.stiffness)
+        anchors.stiffness = float(drive.stiffness)
         return anchors
 
     def _reset(self, step: int) -> None:

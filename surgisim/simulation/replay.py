@@ -12,8 +12,8 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.replay import Replay
 from surgisim.artifacts.scene import Scene
 from surgisim.config.simulation import Simulation
-from surgisim.mpm.grip import Drive, drive
-from surgisim.mpm.setup import checked_per_frame, prepare, theta_of, values_of
+from surgisim.mpm.grip import Drive
+from surgisim.mpm.setup import Prepared, checked_per_frame, prepare, theta_of, values_of
 from surgisim.mpm.simulator import Run, Simulator
 from surgisim.physics.catalogue import choose
 from surgisim.problem import Problem
@@ -45,11 +45,11 @@ def replay(
         else plan(settings.operation, body.rest, body.surface, camera, body.spacing)
     )
     per_frame = checked_per_frame(physics, material, camera.fps) * settings.refine_step
-    path = drive(task.motion, body.rest, body.held, fps=camera.fps, per_frame=per_frame, frames=len(task.base))
+    parts = _parts(body, scene, physics, task, settings.device)
+    path = parts[0].drive(task.motion, values_of(physics), fps=camera.fps, per_frame=per_frame, frames=len(task.base))
     clock = np.arange(path.steps + 1) / per_frame
     path.path[0] = np.stack([np.interp(clock, np.arange(len(task.base)), task.base[:, a]) for a in range(3)], -1)
-    parts = _parts(body, scene, physics, task, settings.device)
-    states, whole = _march(parts, theta, path, task, lambda d, t, s: progress(0.5 * d, t, s))
+    states, whole = _march([p.simulator for p in parts], theta, path, task, lambda d, t, s: progress(0.5 * d, t, s))
     frames = len(path.path[0]) // per_frame + 1
     position, nodes, smallest, energy, rgb = [], [], [], [], []
     looks = {}
@@ -82,14 +82,14 @@ def replay(
     )
 
 
-def _parts(body: Body, scene: Scene, physics: Physics, task: Plan, device: str) -> list[Simulator]:
+def _parts(body: Body, scene: Scene, physics: Physics, task: Plan, device: str) -> list[Prepared]:
     """The whole body and, when something is cut, the cut one."""
     make = [None] if task.cut is None else [None, task.cut]
     return [
         prepare(
-            body, tuple(physics.terms), values_of(physics), density=physics.density, gravity=tuple(physics.gravity),
+            body, tuple(physics.terms), density=physics.density, gravity=tuple(physics.gravity),
             carried=scene.mean.astype(float), cut=cut, device=device,
-        ).simulator
+        )
         for cut in make
     ]  # fmt: skip
 

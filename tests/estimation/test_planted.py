@@ -16,7 +16,6 @@ from surgisim.config.estimation import Estimation
 from surgisim.estimation.fit import _windows, estimate
 from surgisim.estimation.observation import PHASES, phases
 from surgisim.estimation.search import search
-from surgisim.mpm.grip import drive
 from surgisim.mpm.setup import prepare
 from surgisim.problem import Problem
 
@@ -33,14 +32,14 @@ def silent(*_):
 def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, seed=0):
     """What the stages before would hand over, made with `values` and then forgotten."""
     body, motion = slab(), motion or pulled(frames=T, hold=9)
-    made = prepare(body, tuple(values), values, density=1050.0)
+    made = prepare(body, tuple(values), density=1050.0)
     theta = made.theta(values)
     if stiff is not None:
         theta[:, 0] *= stiff(body.rest)
     per_frame = 2 * made.per_frame(
         {**values, "corotated": {"E": theta[:, 0].max(), "nu": values["corotated"]["nu"]}}, FPS
     )
-    run = made.simulator.run(theta, drive(motion, body.rest, body.held, fps=FPS, per_frame=per_frame))
+    run = made.simulator.run(theta, made.drive(motion, values, fps=FPS, per_frame=per_frame))
     points = body.rest[body.surface].astype(float)
     rng = np.random.default_rng(seed)
     carry = made.simulator.carry(points)

@@ -6,7 +6,6 @@ from slab import pulled, slab
 
 from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
-from surgisim.mpm.grip import drive
 from surgisim.mpm.setup import prepare
 from surgisim.mpm.simulator import Breakdown
 from surgisim.mpm.stable import check_step
@@ -19,12 +18,12 @@ FPS = 25.0
 def prepared(values=None, body=None, **more):
     values = values or SOFT
     body = body or slab()
-    return prepare(body, tuple(values), values, density=1050.0, **more), body
+    return prepare(body, tuple(values), density=1050.0, **more), body
 
 
 def run(made, body, values, motion, refine=1, held=None):
     per_frame = made.per_frame(values, FPS) * refine
-    path = drive(motion, body.rest, body.held if held is None else held, fps=FPS, per_frame=per_frame)
+    path = made.drive(motion, values, fps=FPS, per_frame=per_frame, held=held)
     return made.simulator.run(made.theta(values), path), path
 
 
@@ -59,7 +58,8 @@ def test_momentum_is_kept_when_nothing_pushes():
     positions = made.simulator.grid.positions()[made.simulator.place]
     v = np.cross([0.0, 0.0, 8.0], positions - positions.mean(0)) + np.array([0.1, 0.0, 0.0])
     motion = free(body, 12)
-    path = drive(motion, body.rest, np.zeros(len(body.rest), bool), fps=FPS, per_frame=made.per_frame(SOFT, FPS))
+    none = np.zeros(len(body.rest), bool)
+    path = made.drive(motion, SOFT, fps=FPS, per_frame=made.per_frame(SOFT, FPS), held=none)
     out = made.simulator.run(made.theta(SOFT), path, begin=(np.zeros_like(v), v))
     before, after = (mass * v).sum(0), (mass * out.v[-1]).sum(0)
     assert np.allclose(after, before, atol=1e-5 * np.abs(before).max())
@@ -104,9 +104,9 @@ def test_two_runs_give_the_same_bytes():
 
 
 def test_a_run_goes_on_from_where_it_stopped():
-    made, body = prepared()
+    made, _ = prepared()
     motion = pulled()
-    path = drive(motion, body.rest, body.held, fps=FPS, per_frame=made.per_frame(SOFT, FPS))
+    path = made.drive(motion, SOFT, fps=FPS, per_frame=made.per_frame(SOFT, FPS))
     theta = made.theta(SOFT)
     whole = made.simulator.run(theta, path)
     first = made.simulator.run(theta, path, last=7)
@@ -119,7 +119,7 @@ def test_the_adjoint_is_the_slope_of_a_loss_on_all_frames():
     body = slab(size=(0.036, 0.03, 0.018))
     made, _ = prepared(values, body)
     motion = pulled(frames=10, hold=6)
-    path = drive(motion, body.rest, body.held, fps=FPS, per_frame=made.per_frame(values, FPS, 0.8))
+    path = made.drive(motion, values, fps=FPS, per_frame=made.per_frame(values, FPS, 0.8))
     theta, rng = made.theta(values), np.random.default_rng(0)
     out = made.simulator.run(theta, path)
     c = rng.standard_normal(out.u.shape)
@@ -142,7 +142,7 @@ def test_a_grip_beside_the_body_is_refused():
     motion = pulled()
     far = type(motion)(motion.center_rest + 1.0, *[getattr(motion, n) for n in list(motion.__dict__)[1:]])
     with pytest.raises(Problem, match=r"grip 0 .* lies outside the body; the nearest tissue is 1\.\d+ m away"):
-        drive(far, slab().rest, slab().held, fps=FPS, per_frame=10)
+        prepared()[0].drive(far, SOFT, fps=FPS, per_frame=10)
 
 
 def test_a_step_too_large_names_the_largest_stable_one():

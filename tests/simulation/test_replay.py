@@ -25,7 +25,7 @@ def silent(*_):
 
 
 def fitted(body, step=None):
-    made = prepare(body, tuple(VALUES), VALUES, density=1050.0)
+    made = prepare(body, tuple(VALUES), density=1050.0)
     step = step or 1 / 25.0 / made.per_frame(VALUES, 25.0)
     terms = {law: {p: {"value": v, "unit": UNITS[p]} for p, v in ps.items()} for law, ps in VALUES.items()}
     physics = Physics(terms, 1050.0, [0.0, 0.0, 0.0], {"spacing": body.spacing, "step": step})
