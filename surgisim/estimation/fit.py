@@ -182,11 +182,11 @@ def _windows(motion: Motion, fitted: np.ndarray, share: float) -> list[int]:
     end = int(fitted[-1])
     speed = np.linalg.norm(np.diff(motion.position, axis=1), axis=-1).max(0) * motion.active[:, 1:].any(0)
     start = int(np.argmax(speed > 0.1 * speed.max())) + 3
-    windows, last = [], max(start, int(share * end))
-    while last < end:
-        windows.append(int(fitted[np.searchsorted(fitted, last)]))
-        last *= 2
-    return [*windows, end]
+    first = max(start, int(share * end), 2)
+    windows = [end]
+    while windows[0] // 2 >= first:
+        windows.insert(0, int(fitted[np.searchsorted(fitted, windows[0] // 2)]))
+    return windows
 
 
 def _plain(wanted: Search, x: np.ndarray) -> list[float]:
