@@ -31,6 +31,10 @@ def test_one_seed_one_clip(small_film):
     assert encoded(again[1], **header) == encoded(small_film[1], **header)
 
 
+def test_one_encoding_of_the_same_frames(small_film):
+    assert len({encode(small_film[0][4:16], 25.0, 12) for _ in range(25)}) == 1
+
+
 def test_another_seed_is_another_scene():
     first, second = invent(SMALL), invent(SMALL.model_copy(update={"seed": 8}))
     assert not np.allclose(first.shape.waves, second.shape.waves)
