@@ -18,13 +18,10 @@ from surgisim.stage import Bytes, stage
     settings=Thickening,
 )
 def main(scene, camera, *, settings, progress):
-    from surgisim.gaussians.attributes import drawn
-    from surgisim.gaussians.rasterise import render
-    from surgisim.gaussians.surface import surface_from
+    from surgisim.gaussians.surface import surface_of
     from surgisim.thickening import points, thicken
 
-    image = render(*drawn(scene), camera)
-    surface = surface_from(image, least_cover=settings.least_cover, smooth=settings.smooth)
+    surface = surface_of(scene, camera, least_cover=settings.least_cover, smooth=settings.smooth)
     body = thicken(surface, camera, settings, centers=scene.mean, progress=progress)
     return body, points(body)
 

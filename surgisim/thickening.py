@@ -14,6 +14,7 @@ from scipy import ndimage
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.ply import write_ply
 from surgisim.config.thickening import Thickening
 from surgisim.gaussians.surface import Surface
 from surgisim.problem import Problem
@@ -54,6 +55,15 @@ def thicken(
         progress(0.9, 1, f"dropped {pieces - 1} loose pieces ({lost} of {len(whole)} particles)")
     progress(1, 1, f"{int(whole.sum())} particles, grid spacing {1000 * spacing:.2f} mm")
     return Body(body.rest[whole], body.volume[whole], body.color[whole], body.surface[whole], body.held[whole], spacing)
+
+
+def points(body: Body) -> bytes:
+    """The body as coloured points any viewer opens: PLY with flags for surface and held particles."""
+    columns = {name: body.rest[:, i] for i, name in enumerate("xyz")}
+    color = np.rint(np.clip(body.color, 0, 1) * 255).astype(np.uint8)
+    columns |= {name: color[:, i] for i, name in enumerate(("red", "green", "blue"))}
+    columns |= {"surface": body.surface.astype(np.uint8), "held": body.held.astype(np.uint8)}
+    return write_ply(columns, {"kind": "Points", "units": {"x": "m"}})
 
 
 def bounding_box(surface: Surface, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
@@ -114,11 +124,9 @@ def _columns(surface, camera, settings, low, high, step) -> _Columns:
         thickness *= longest
     deepest = settings.back * high[2] if thickness is None else high[2] + thickness + 2 * step
     depths = np.linspace(low[2], deepest, max(int(np.ceil((deepest - low[2]) / step)), 2) * FINE)
-    points = np.concatenate(
-        [np.broadcast_to(xy[:, None], (len(xy), len(depths), 2)), np.broadcast_to(depths[:, None], (len(xy), len(depths), 1))],
-        -1,
-    )
-    above, _, seen = surface.at(camera, points)
+    samples = (len(xy), len(depths), 2), (len(xy), len(depths), 1)
+    points = [np.broadcast_to(a, n) for a, n in zip((xy[:, None], depths[:, None]), samples, strict=True)]
+    above, _, seen = surface.at(camera, np.concatenate(points, -1))
     gap = depths - above
     within = seen & (gap >= 0)
     first = np.argmax(within, 1)

@@ -13,6 +13,8 @@ class Reconstruction(Settings):
     frozen and the canonical scene refined [fraction of iterations]."""
     seed: int = 0
     """Seed of the frames' order and of the head's first weights [1]."""
+    rest_every: int = Field(3, ge=0)
+    """Every so many iterations frame 0 is looked at, out of turn: the canonical scene has to be it; 0 for never [1]."""
     threads: int = Field(2, ge=1)
     """Threads of the linear algebra; the result depends on it in the last digits [1]."""
 
@@ -32,7 +34,7 @@ class Reconstruction(Settings):
     head_width: int = Field(48, ge=1)
     """Neurons in each of the head's two hidden layers [1]."""
 
-    trajectory: float = Field(1.0, ge=0)
+    trajectory: float = Field(0.5, ge=0)
     """Weight of the trajectory term, 0 switches it off [1]."""
     trajectory_form: str = Field("default", pattern="^(default|literal)$")
     """'default' asks neighbours for equal motion, 'literal' is the paper's printed sum of dot products [-]."""
@@ -46,11 +48,16 @@ class Reconstruction(Settings):
     """Length r_m is counted in; the paper's scenes have no unit [median first radius]."""
     anisotropy_ratio: float = Field(3.0, ge=1)
     """r_ani, largest over smallest radius [1]."""
+    pooled: float = Field(1.0, ge=0)
+    """Weight of the colour misfit averaged over blocks, in the coarse phase only: it sees motions that are longer than
+    the texture is wide [1]."""
+    pooled_sizes: tuple[float, ...] = (0.025, 0.075)
+    """Sides of the blocks [longest image side]."""
     depth: float = Field(0.5, ge=0)
     """Weight of the depth misfit [1/median depth]."""
-    smoothness_space: float = Field(0.01, ge=0)
+    smoothness_space: float = Field(0.002, ge=0)
     """Weight of the planes' squared differences in space [1]."""
-    smoothness_time: float = Field(0.01, ge=0)
+    smoothness_time: float = Field(0.005, ge=0)
     """Weight of the time planes' squared second differences [1]."""
 
     weight_copied: float = Field(0.3, ge=0, le=1)
@@ -62,7 +69,7 @@ class Reconstruction(Settings):
 
     rate_mean: float = Field(2e-4, gt=0)
     """Step size of the centres [half longest side of the box]."""
-    rate_color: float = Field(5e-3, gt=0)
+    rate_color: float = Field(2e-3, gt=0)
     """Step size of the colours [1]."""
     rate_opacity: float = Field(2e-2, gt=0)
     """Step size of the opacities' logits [1]."""

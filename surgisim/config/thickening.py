@@ -10,7 +10,7 @@ from surgisim.config.base import Settings
 class Thickening(Settings):
     method: Literal["behind", "literal"] = "behind"
     """'behind' puts material behind the seen surface, 'literal' is the paper's Algorithm 1 as printed [-]."""
-    cells: int = Field(15, ge=3)
+    cells: int = Field(12, ge=3)
     """Grid cells along the longest side of the seen surface [1]."""
     per_cell: float = Field(8.0, gt=0)
     """Particles in a grid cell [1/cell]."""
@@ -25,7 +25,8 @@ class Thickening(Settings):
     held_rear: int = Field(1, ge=0)
     """Particle layers at the back that do not move, half a grid cell each [1]."""
     held_border: int = Field(2, ge=0)
-    """Particle columns along the border of what is seen that do not move, half a grid cell each; 0 leaves it free [1]."""
+    """Particle columns along the border of what is seen that do not move, half a grid cell each; 0 leaves it free
+    [1]."""
     smooth: float = Field(0.03, ge=0, le=0.5)
     """Width of the median filter over the surface's depth [longest image side]."""
     least_cover: float = Field(0.5, gt=0, lt=1)

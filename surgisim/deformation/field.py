@@ -9,6 +9,7 @@ adds dS without saying in which scale; the logarithm keeps radii positive.
 
 import json
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import torch
@@ -40,7 +41,8 @@ class Field:
         """dmu [m] (G, 3), do (G,), dR (G, 4), dS (G, 3) of Gaussians resting at `mean` [m], (G, 3), at `time` [s]."""
         x = features(self.planes, self.inside(mean), self.clock(time), self.layout)
         for weight in self.head[:-1]:
-            x = torch.relu(torch.nn.functional.linear(x, weight))
+            # Not a ReLU: its slope at 0, where every feature starts, is 0, and nothing would ever move.
+            x = torch.nn.functional.silu(torch.nn.functional.linear(x, weight))
         moved, opacity, turn, grow = torch.nn.functional.linear(x, self.head[-1]).split(OUTPUTS, 1)
         return moved * self.reach, opacity[:, 0], turn, grow
 
@@ -70,8 +72,7 @@ def still_field(
     layout = Layout(np.asarray(sizes, np.int64), channels)
     widths = [layout.features, width, width, sum(OUTPUTS)]
     head = tuple(
-        torch.tensor(rng.standard_normal((n, m)) * np.sqrt(1.0 / m), dtype=torch.float32)
-        for m, n in zip(widths, widths[1:], strict=False)
+        torch.tensor(rng.standard_normal((n, m)) * np.sqrt(1.0 / m), dtype=torch.float32) for m, n in pairwise(widths)
     )
     return Field(layout, np.asarray(low, float), np.asarray(high, float), torch.ones(layout.count), head)
 
@@ -106,7 +107,7 @@ def load_field(deformation: Deformation) -> Field:
         )
     head = tuple(
         torch.from_numpy(deformation.weights[a:b].reshape(shape).copy())
-        for a, b, shape in zip(ends, ends[1:], told["head"], strict=False)
+        for (a, b), shape in zip(pairwise(ends), told["head"], strict=True)
     )
     low, high = deformation.low.astype(float), deformation.high.astype(float)
     return Field(layout, low, high, torch.from_numpy(deformation.planes.copy()), head)

@@ -3,11 +3,14 @@
 Wang, Yang, Zhao, Yang and Shen, Realistic surgical simulation from monocular videos, section 3.2.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
+import numba
 import numpy as np
 import torch
+from torch.nn.functional import avg_pool2d
 
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.deformation import Deformation
@@ -26,7 +29,7 @@ from surgisim.gaussians.initialise import initialise
 from surgisim.gaussians.losses import anisotropic, masked_l1, trajectory
 from surgisim.gaussians.neighbours import groups
 from surgisim.gaussians.observations import Observations, observe
-from surgisim.gaussians.rasterise import rasterise, render, to_bytes
+from surgisim.gaussians.rasterise import Image, rasterise, render, to_bytes
 from surgisim.gaussians.schedule import Phase, phase_at, rate_at
 from surgisim.problem import Problem
 
@@ -74,11 +77,25 @@ def reconstruct(
         camera,
         most=settings.gaussians,
     )
-    fit = Fit(start, seen, camera, len(frames.rgb), settings)
-    history = fit.run(progress)
-    scene, field = fit.result()
-    rgb = np.stack([picture(scene, field, camera, t) for t in range(len(frames.rgb))])
+    with threads(settings.threads):
+        fit = Fit(start, seen, camera, len(frames.rgb), settings)
+        history = fit.run(progress)
+        scene, field = fit.result()
+        rgb = np.stack([picture(scene, field, camera, t) for t in range(len(frames.rgb))])
     return Reconstructed(scene, save_field(field, history), Frames(rgb, frames.split))
+
+
+@contextmanager
+def threads(count: int) -> Iterator[None]:
+    """Let torch and the compiled loops use this many threads, as far as there are, and give back what was set."""
+    before = torch.get_num_threads(), numba.get_num_threads()
+    torch.set_num_threads(count)
+    numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before[0])
+        numba.set_num_threads(before[1])
 
 
 def picture(scene: Scene, field: Field, camera: Camera, frame: int) -> np.ndarray:
@@ -115,7 +132,9 @@ class Fit:
                 order = self.rng.permutation(len(self.seen.frame)).tolist()
             if i in renewals:
                 self.renew()
-            loss, error = self.step(phase, order.pop(), i)
+            # Frame 0 is the rest scene: seen no oftener than others, the scene would settle where it is on average.
+            anchor = self.settings.rest_every and i % self.settings.rest_every == 0
+            loss, error = self.step(phase, 0 if anchor else order.pop(), i)
             loss_sum.append(loss)
             error_sum.append(error)
             if len(loss_sum) >= max(total // REPORTS, 1) or i == total - 1:
@@ -129,7 +148,9 @@ class Fit:
     def step(self, phase: Phase, u: int, iteration: int) -> tuple[float, float]:
         """One frame's loss, its gradients, one step; returns the loss and the mean squared error on seen tissue."""
         adam = self.adam
-        adam.watch([*(ATTRIBUTES if phase.moves_canonical else ()), *(("planes", *self.head) if phase.moves_field else ())])
+        adam.watch(
+            [*(ATTRIBUTES if phase.moves_canonical else ()), *(("planes", *self.head) if phase.moves_field else ())]
+        )
         time = self.seen.frame[u] / self.camera.fps
         field = self.current_field()
         mean = adam.tensors["mean"]
@@ -145,7 +166,7 @@ class Fit:
             self.camera,
             probe=probe,
         )
-        loss = self.misfit(image, u) + self.priors(phase, field, radius, moved, time)
+        loss = self.misfit(phase, image, u) + self.priors(phase, field, radius, moved, time)
         if not torch.isfinite(loss):
             raise Problem(
                 f"reconstruction: the loss is not finite at iteration {iteration}, frame {self.seen.frame[u]}. "
@@ -158,15 +179,22 @@ class Fit:
         error = (image.rgb.detach() - self.seen.rgb[u])[whole].square().mean() if whole.any() else torch.zeros(())
         return float(loss.detach()), float(error)
 
-    def misfit(self, image, u: int) -> torch.Tensor:
+    def misfit(self, phase: Phase, image: Image, u: int) -> torch.Tensor:
         """Colour and depth of one frame against what was seen."""
         seen, settings = self.seen, self.settings
         color = masked_l1(image.rgb, seen.rgb[u], seen.weight[u])
+        if phase.number == 1 and settings.pooled:
+            wrong = ((image.rgb - seen.rgb[u]) * seen.weight[u][..., None]).permute(2, 0, 1)[None]
+            for share in settings.pooled_sizes:
+                block = max(round(share * max(seen.z.shape[1:])), 1)
+                color = color + settings.pooled * avg_pool2d(wrong, block, max(block // 2, 1)).abs().mean()
         # sum w (z_i - z), so that a surface that is not yet opaque is not pushed away to make up for it.
         depth = masked_l1(image.depth / self.middle, seen.z[u] / self.middle * image.alpha, seen.trust[u])
         return color + settings.depth * depth
 
-    def priors(self, phase: Phase, field: Field, radius: torch.Tensor, moved: torch.Tensor, time: float) -> torch.Tensor:
+    def priors(
+        self, phase: Phase, field: Field, radius: torch.Tensor, moved: torch.Tensor, time: float
+    ) -> torch.Tensor:
         """What is asked of scene and field besides the picture."""
         settings = self.settings
         total = radius.new_zeros(())
@@ -180,7 +208,9 @@ class Fit:
                 self.groups = torch.from_numpy(groups(points, settings.neighbours))
             before = field(self.adam.tensors["mean"], time - 1 / self.camera.fps)[0]
             literal = settings.trajectory_form == "literal"
-            total = total + settings.trajectory * trajectory((moved - before) / self.radius, self.groups, literal=literal)
+            total = total + settings.trajectory * trajectory(
+                (moved - before) / self.radius, self.groups, literal=literal
+            )
         if phase.moves_field:
             space, rough = roughness(field.planes, field.layout)
             total = total + settings.smoothness_space * space + settings.smoothness_time * rough

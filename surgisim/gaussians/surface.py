@@ -7,6 +7,9 @@ import numpy as np
 from scipy import ndimage
 
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.scene import Scene
+from surgisim.gaussians.attributes import drawn
+from surgisim.gaussians.rasterise import render
 from surgisim.problem import Problem
 
 
@@ -31,14 +34,23 @@ class Surface:
         return z, self.color[row, column].reshape(points.shape), seen
 
 
+def surface_of(scene: Scene, camera: Camera, *, least_cover: float = 0.5, smooth: float = 0.03) -> Surface:
+    """Height map of the canonical scene as the camera sees it; see `surface_from`."""
+    image = render(*drawn(scene), camera)
+    cover = np.maximum(image.alpha, np.finfo(np.float32).tiny)
+    return surface_from(
+        image.depth / cover, image.rgb / cover[..., None], image.alpha, least_cover=least_cover, smooth=smooth
+    )
+
+
 def surface_from(
     z: np.ndarray, color: np.ndarray, cover: np.ndarray, *, least_cover: float = 0.5, smooth: float = 0.03
 ) -> Surface:
     """Height map of a rendered scene.
 
-    z: depth [m], (H, W), believed where `cover` (H, W, 0-1) reaches `least_cover`; color: (H, W, 3); smooth: width of the
-    median filter, share of the longest side. The largest covered piece is kept and its holes (an instrument hid what is
-    behind) are filled smoothly from their rims. Raises Problem where nothing is covered.
+    z: depth [m], (H, W), believed where `cover` (H, W, 0-1) reaches `least_cover`; color: (H, W, 3); smooth: width of
+    the median filter, share of the longest side. The largest covered piece is kept and its holes (an instrument hid
+    what is behind) are filled smoothly from their rims. Raises Problem where nothing is covered.
     """
     believed = cover >= least_cover
     if not believed.any():

@@ -1,0 +1,84 @@
+import numba
+import numpy as np
+import pytest
+import torch
+
+from surgisim.deformation.planes import SPACE, Layout, features
+
+SIZES = np.array([[4, 5, 3, 4], [7, 6, 4, 9]])
+
+
+@pytest.fixture
+def planes():
+    layout = Layout(SIZES, 10)
+    rng = np.random.default_rng(0)
+    return layout, torch.tensor(rng.uniform(0.5, 1.5, layout.count)), torch.tensor(rng.uniform(0.02, 0.98, (40, 3)))
+
+
+def twin(flat, where, time, layout):
+    """The same through torch's own bilinear lookup."""
+    out = []
+    for scale in range(len(layout.sizes)):
+
+        def look(index, down, across, scale=scale):
+            grid = torch.stack([across, down], 1)[None, None] * 2 - 1
+            image = layout.plane(flat, scale, index).permute(2, 0, 1)[None]
+            kept = {"mode": "bilinear", "padding_mode": "border", "align_corners": True}
+            return torch.nn.functional.grid_sample(image, grid, **kept)[0, :, 0].T
+
+        space = torch.stack([look(p, where[:, i], where[:, j]) for p, (i, j) in enumerate(SPACE)]).prod(0)
+        now, rest = (
+            torch.stack([look(3 + a, torch.full_like(where[:, 0], t), where[:, a]) for a in range(3)]).prod(0)
+            for t in (time, 0.0)
+        )
+        out.append(space * (now - rest))
+    return torch.cat(out, 1)
+
+
+@pytest.mark.parametrize("time", [0.0, 0.37, 1.0])
+def test_features_and_their_slopes_agree_with_torch(planes, time):
+    layout, flat, where = planes
+    slope = torch.tensor(np.random.default_rng(1).standard_normal((40, layout.features)))
+    results = []
+    for look in (features, twin):
+        a, b = flat.clone().requires_grad_(), where.clone().requires_grad_()
+        value = look(a, b, time, layout)
+        (value * slope).sum().backward()
+        results.append((value.detach(), a.grad, b.grad))
+    for mine, other in zip(*results, strict=True):
+        torch.testing.assert_close(mine, other, rtol=1e-10, atol=1e-12)
+
+
+def test_slopes_agree_with_differences(planes):
+    layout, flat, where = planes
+    few = Layout(layout.sizes[:1], 2)
+    flat, where = flat[: few.count].clone().requires_grad_(), where[:4].clone().requires_grad_()
+    assert torch.autograd.gradcheck(lambda a, b: features(a, b, 0.37, few), (flat, where))
+
+
+def test_nothing_has_moved_at_the_start(planes):
+    layout, flat, where = planes
+    assert not features(flat, where, 0.0, layout).any()
+
+
+def test_outside_the_box_the_border_is_read(planes):
+    layout, flat, where = planes
+    outside = where.clone()
+    outside[:, 0] = 1.7
+    border = where.clone()
+    border[:, 0] = 1.0
+    assert torch.equal(features(flat, outside, 0.4, layout), features(flat, border, 0.4, layout))
+
+
+def test_the_number_of_threads_changes_no_byte(planes):
+    layout, flat, where = planes
+    flat, where = flat.float(), where.float()
+    grads = []
+    before = numba.get_num_threads()
+    for threads in {1, before}:
+        numba.set_num_threads(threads)
+        a, b = flat.clone().requires_grad_(), where.clone().requires_grad_()
+        features(a, b, 0.4, layout).square().sum().backward()
+        grads.append((a.grad.numpy().tobytes(), b.grad.numpy().tobytes()))
+    numba.set_num_threads(before)
+    assert len(set(grads)) == 1

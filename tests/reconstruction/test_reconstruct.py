@@ -1,0 +1,115 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from conftest import PUSH, H, T, W, Z, push
+
+from surgisim.deformation.field import displace, load_field
+from surgisim.gaussians.densify import ATTRIBUTES
+from surgisim.gaussians.reconstruct import reconstruct
+from surgisim.gaussians.schedule import PHASES
+from surgisim.problem import Problem
+
+
+@pytest.fixture(scope="module")
+def done(clip):
+    return reconstruct(*parts(clip))
+
+
+def parts(clip, **changed):
+    names = ("frames", "inpainted", "masks", "depth", "camera", "settings")
+    return [changed.get(name, getattr(clip, name)) for name in names]
+
+
+def test_frames_never_shown_are_predicted(clip, done):
+    held = clip.frames.split == 1
+    assert held.sum() == 2
+    wrong = (done.rendered.rgb[held] / 255 - clip.inpainted.rgb[held] / 255)[clip.masks.tissue[held]]
+    assert -10 * np.log10(np.mean(wrong**2)) > 30
+
+
+def test_the_planted_motion_is_recovered(clip, done):
+    y, x = np.mgrid[8 : H - 8 : 4, 8 : W - 8 : 4].reshape(2, -1).astype(float)
+    rest = clip.camera.lift(np.stack([x, y], -1), np.full(len(x), Z))
+    field = load_field(done.deformation)
+    middle = T // 2
+    moved = clip.camera.project(displace(rest, field, middle / 25.0)) - np.stack([x, y], -1)
+    wrong = np.hypot(moved[:, 0] - push(x, y, middle), moved[:, 1])
+    assert np.median(wrong) < 0.1 * PUSH
+    back = displace(rest, field, (T - 1) / 25.0)
+    assert np.median(np.linalg.norm(clip.camera.project(back) - np.stack([x, y], -1), axis=1)) < 0.1 * PUSH
+
+
+def test_held_out_frames_are_not_looked_at(clip, done):
+    rng = np.random.default_rng(1)
+    held = clip.frames.split == 1
+
+    def other(array):
+        changed = array.copy()
+        changed[held] = rng.permutation(array[held].reshape(-1)).reshape(array[held].shape)
+        return changed
+
+    tool = clip.masks.tool.copy()
+    tool[held] = rng.random(tool[held].shape) < 0.5
+    again = reconstruct(
+        *parts(
+            clip,
+            frames=replace(clip.frames, rgb=other(clip.frames.rgb)),
+            inpainted=replace(clip.inpainted, rgb=other(clip.inpainted.rgb), origin=other(clip.inpainted.origin)),
+            masks=replace(clip.masks, tool=tool, tissue=~tool),
+            depth=replace(clip.depth, z=clip.depth.z * np.where(held, 3, 1).astype(np.float32)[:, None, None]),
+        )
+    )
+    assert same(done, again)
+
+
+def same(a, b):
+    return all(getattr(a.scene, n).tobytes() == getattr(b.scene, n).tobytes() for n in ATTRIBUTES) and (
+        a.deformation.planes.tobytes() == b.deformation.planes.tobytes()
+        and a.deformation.weights.tobytes() == b.deformation.weights.tobytes()
+        and a.rendered.rgb.tobytes() == b.rendered.rgb.tobytes()
+    )
+
+
+def test_history_tells_every_phase_and_keeps_the_bound(clip, done):
+    history = done.deformation.history
+    assert history[-1, 0] == clip.settings.iterations
+    assert set(history[:, 4]) == {1, 2, 3, 4}
+    assert history[:, 3].max() <= clip.settings.most_gaussians
+    assert history[-5:, 2].mean() > history[:5, 2].mean()
+
+
+@pytest.mark.parametrize("phase", PHASES, ids=lambda p: p.name)
+def test_a_phase_moves_what_it_says_and_nothing_else(fit, phase):
+    fit.step(PHASES[0], 5, 0)
+    before = {name: t.detach().clone() for name, t in fit.adam.tensors.items()}
+    fit.step(phase, 6, 1)
+    moved = {name for name, t in fit.adam.tensors.items() if not torch.equal(t.detach(), before[name])}
+    field = {"planes", *fit.head}
+    assert moved == (set(ATTRIBUTES) if phase.moves_canonical else set()) | (field if phase.moves_field else set())
+
+
+def test_the_trajectory_term_acts_in_its_phases_only(clip, fit):
+    fit.step(PHASES[0], 5, 0)
+    calm = clip.settings.model_copy(update={"trajectory": 0.0})
+    for phase in PHASES:
+        values = []
+        for settings in (clip.settings, calm):
+            fit.settings = settings
+            field, mean = fit.current_field(), fit.adam.tensors["mean"]
+            moved, _, _, grow = field(mean, 0.2)
+            values.append(float(fit.priors(phase, field, (fit.adam.tensors["scale"] + grow).exp(), moved, 0.2)))
+        assert (values[0] > values[1]) == phase.trajectory
+
+
+def test_a_number_that_is_not_finite_stops_the_fit_and_names_the_frame(fit):
+    fit.seen.rgb[3, 0, 0] = torch.nan
+    with pytest.raises(Problem, match="iteration 0, frame 4"):
+        fit.step(PHASES[0], 3, 0)
+
+
+def test_inputs_of_two_clips_are_refused(clip):
+    short = replace(clip.depth, z=clip.depth.z[1:], confidence=clip.depth.confidence[1:])
+    with pytest.raises(Problem, match="not of one clip"):
+        reconstruct(*parts(clip, depth=short))
