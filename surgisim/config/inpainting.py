@@ -11,8 +11,9 @@ from surgisim.config.base import Settings
 class Inpainting(Settings):
     backend: str = "flow_copy"
     """A file of surgisim/perception/inpainting: flow_copy, or network for what no frame saw [name]."""
-    margin: Annotated[int, Field(ge=0)] = 2
-    """How far around the instrument is filled in too, because its outline and its blur mix both [px]."""
+    margin: Annotated[int, Field(ge=0)] | None = None
+    """How far around the instrument is filled in too, because its outline, blur and shadow mix both; null is 1.6 %
+    of the longest side [px]."""
     reach: Annotated[int, Field(ge=1)] = 400
     """Farthest frame a pixel may be copied from [frames]."""
     weights: Path | None = None

@@ -29,8 +29,9 @@ class Masking(Settings):
     """Points the user marked as tool or tissue [list]."""
     require_tool: bool = False
     """Whether a clip in which no instrument is found is refused [yes/no]."""
-    margin: Annotated[int, Field(ge=0)] = 1
-    """How far around the instrument the tissue is left out too, because its outline mixes both [px]."""
+    margin: Annotated[int, Field(ge=0)] | None = None
+    """How far around the instrument the tissue is left out too, because its outline mixes both; null is 0.6 % of
+    the longest side [px]."""
     refine: bool = False
     """Whether the outline is drawn to the nearest edge by GrabCut [yes/no]."""
     encoder: Path | None = None

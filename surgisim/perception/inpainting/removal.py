@@ -33,7 +33,8 @@ def without_tool(frames: Frames, masks: Masks, settings: Inpainting, *, progress
         )
     if not masks.tool.any():
         return Inpainted(frames.rgb, np.full(masks.tool.shape, SEEN, np.uint8))
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * settings.margin + 1,) * 2)
+    margin = round(0.016 * max(masks.tool.shape[1:])) if settings.margin is None else settings.margin
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * margin + 1, 2 * margin + 1))
     hole = np.stack([cv2.dilate(m.astype(np.uint8), disc) for m in masks.tool]).astype(bool)
     empty = np.flatnonzero(hole.all((1, 2)))
     if len(empty) == len(hole):

@@ -39,7 +39,8 @@ def followed(before: Source, flow: np.ndarray, index: int, hole: np.ndarray) -> 
     inside = (near >= 0).all(-1) & (near[..., 0] < width) & (near[..., 1] < height)
     x, y = np.clip(near[..., 0], 0, width - 1), np.clip(near[..., 1], 0, height - 1)
     chained = before.xy[y, x] + (end - near)
-    on_picture = (chained >= 0).all(-1) & (chained[..., 0] <= width - 1) & (chained[..., 1] <= height - 1)
+    on_picture = (chained >= -1).all(-1) & (chained[..., 0] <= width) & (chained[..., 1] <= height)
+    chained = np.clip(chained, 0, [width - 1, height - 1])
     usable = hole & inside & on_picture & (before.frame[y, x] >= 0)
     return Source(
         np.where(usable, before.frame[y, x], here.frame), np.where(usable[..., None], chained, here.xy).astype("f4")

@@ -27,7 +27,8 @@ def masks(frames: Frames, given: Given, settings: Masking, *, progress: Progress
         name = "given" if len(given.tool) else "colour_motion"
     tool, confidence = _backend(name)(frames, given, settings, progress)
     _say_what_was_found(tool, confidence, name, settings, progress)
-    around = np.stack([_wider(m, settings.margin) for m in tool])
+    margin = round(0.006 * max(tool.shape[1:])) if settings.margin is None else settings.margin
+    around = np.stack([_wider(m, margin) for m in tool])
     return Masks(tool, lit(frames.rgb) & ~around, specular(frames.rgb, tool), confidence.astype(np.float32))
 
 

@@ -109,6 +109,7 @@ def _drawn(decoder, embedded: dict[str, np.ndarray], prompt: Prompt) -> tuple[np
     """The best of the network's three outlines, and how sure it is."""
     region, points, labels = prompt
     height, width = region.shape
+    # The rough mask is a hint only: given with full weight it comes back as it went in.
     scale = np.array([SIDE / width, SIDE / height], np.float32)
     low = cv2.resize(region.astype(np.float32), (LOW, LOW), interpolation=cv2.INTER_AREA)
     answers, sure = decoder.run(
@@ -117,7 +118,7 @@ def _drawn(decoder, embedded: dict[str, np.ndarray], prompt: Prompt) -> tuple[np
         | {
             "point_coords": ((points + 0.5) * scale)[None],
             "point_labels": labels[None],
-            "mask_input": ((low - 0.5) * 12)[None, None],
+            "mask_input": ((low - 0.5) * 3)[None, None],
             "has_mask_input": np.array([float(region.any())], np.float32),
         },
     )
