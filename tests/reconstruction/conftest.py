@@ -43,6 +43,8 @@ def clip():
     split[1::8] = 1
     split[-1] = 2
     return SimpleNamespace(
+        push=push,
+        z=Z,
         frames=Frames(seen, split),
         inpainted=Inpainted(clean, tool.astype(np.uint8)),
         masks=Masks(tool, ~tool, np.zeros_like(tool), np.ones(T, np.float32)),

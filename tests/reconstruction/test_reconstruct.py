@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from conftest import PUSH, H, T, W, Z, push
 
 from surgisim.deformation.field import displace, load_field
 from surgisim.gaussians.densify import ATTRIBUTES
@@ -30,15 +29,17 @@ def test_frames_never_shown_are_predicted(clip, done):
 
 
 def test_the_planted_motion_is_recovered(clip, done):
-    y, x = np.mgrid[8 : H - 8 : 4, 8 : W - 8 : 4].reshape(2, -1).astype(float)
-    rest = clip.camera.lift(np.stack([x, y], -1), np.full(len(x), Z))
-    field = load_field(done.deformation)
-    middle = T // 2
-    moved = clip.camera.project(displace(rest, field, middle / 25.0)) - np.stack([x, y], -1)
-    wrong = np.hypot(moved[:, 0] - push(x, y, middle), moved[:, 1])
-    assert np.median(wrong) < 0.1 * PUSH
-    back = displace(rest, field, (T - 1) / 25.0)
-    assert np.median(np.linalg.norm(clip.camera.project(back) - np.stack([x, y], -1), axis=1)) < 0.1 * PUSH
+    length, height, width = clip.depth.z.shape
+    start = np.stack(np.mgrid[8 : width - 8 : 4, 8 : height - 8 : 4], -1).reshape(-1, 2).astype(float)
+    rest, field = clip.camera.lift(start, np.full(len(start), clip.z)), load_field(done.deformation)
+
+    def moved(t):
+        return clip.camera.project(displace(rest, field, t / clip.camera.fps)) - start
+
+    middle = length // 2
+    planted = clip.push(*start.T, middle)
+    assert np.median(np.hypot(moved(middle)[:, 0] - planted, moved(middle)[:, 1])) < 0.1 * planted.max()
+    assert np.median(np.linalg.norm(moved(length - 1), axis=1)) < 0.1 * planted.max()
 
 
 def test_held_out_frames_are_not_looked_at(clip, done):
@@ -99,7 +100,8 @@ def test_the_trajectory_term_acts_in_its_phases_only(clip, fit):
             fit.settings = settings
             field, mean = fit.current_field(), fit.adam.tensors["mean"]
             moved, _, _, grow = field(mean, 0.2)
-            values.append(float(fit.priors(phase, field, (fit.adam.tensors["scale"] + grow).exp(), moved, 0.2)))
+            radius = (fit.adam.tensors["scale"] + grow).exp()
+            values.append(fit.priors(phase, field, radius, moved, 0.2).item())
         assert (values[0] > values[1]) == phase.trajectory
 
 
