@@ -18,10 +18,12 @@ class Reconstruction(Settings):
     threads: int = Field(2, ge=1)
     """Threads of the linear algebra; the result depends on it in the last digits [1]."""
 
-    gaussians: int = Field(10000, ge=50)
-    """Gaussians to start from, as far as the image has pixels for them [1]."""
-    most_gaussians: int = Field(14000, ge=50)
-    """Never more than this [1]."""
+    gaussians_per_pixel: float = Field(0.5, gt=0, le=1)
+    """Gaussians to start from for each pixel of tissue [1/px]."""
+    growth: float = Field(1.4, ge=1)
+    """Bound on their number while some are dropped and others split [number at the start]."""
+    most_gaussians: int = Field(25000, ge=50)
+    """Bound on their number whatever the image's size [1]."""
 
     channels: int = Field(16, ge=1)
     """Features in each plane [1]."""

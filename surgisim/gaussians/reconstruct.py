@@ -75,7 +75,8 @@ def reconstruct(
         masks.tool[seen.frame],
         masks.tissue[seen.frame] | (masks.specular[seen.frame] & ~masks.tool[seen.frame]),
         camera,
-        most=settings.gaussians,
+        stride=settings.gaussians_per_pixel**-0.5,
+        most=max(int(settings.most_gaussians / settings.growth), 1),
     )
     with threads(settings.threads):
         fit = Fit(start, seen, camera, len(frames.rgb), settings)
@@ -111,6 +112,7 @@ class Fit:
         self.rng = np.random.default_rng(settings.seed)
         self.field = first_field(start.mean, camera, length, settings, self.rng)
         self.radius = float(np.exp(np.median(start.scale)))
+        self.most = min(settings.most_gaussians, int(settings.growth * len(start.mean)))
         self.middle = float(np.median(start.mean[:, 2]))
         self.head = [f"head_{i}" for i in range(len(self.field.head))]
         tensors = {name: torch.from_numpy(getattr(start, name)) for name in ATTRIBUTES}
@@ -218,7 +220,7 @@ class Fit:
 
     def renew(self) -> None:
         """Drop and split Gaussians."""
-        renew(self.adam, self.record, self.settings.most_gaussians, SPLIT, WIDEST * self.radius)
+        renew(self.adam, self.record, self.most, SPLIT, WIDEST * self.radius)
         self.record = Record.empty(len(self.adam.tensors["mean"]))
         self.groups = None
 

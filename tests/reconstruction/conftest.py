@@ -50,9 +50,7 @@ def clip():
         masks=Masks(tool, ~tool, np.zeros_like(tool), np.ones(T, np.float32)),
         depth=Depth(np.full((T, H, W), Z, np.float32), np.ones((T, H, W), np.float32), "known"),
         camera=Camera(W, H, 50.0, 50.0, (W - 1) / 2, (H - 1) / 2, 25.0, T, "known", "given", "x", [W, H], [0, 0, W, H]),
-        settings=Reconstruction(
-            iterations=400, gaussians=700, most_gaussians=900, knots=(6, 12), knots_in_depth=(2, 2), threads=1
-        ),
+        settings=Reconstruction(iterations=400, most_gaussians=900, knots=(6, 12), knots_in_depth=(2, 2), threads=1),
     )
 
 
