@@ -63,10 +63,15 @@ def grown_inward(frame: np.ndarray, hole: np.ndarray) -> np.ndarray:
 def _tissue_motion(rgb, hole, progress) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Flow of the tissue t -> t + 1 (last entry unused) and t -> t - 1 (first unused)."""
     still = np.zeros((*rgb.shape[1:3], 2), np.float32)
+    # The instrument is smoothed away first: its edges would drag the flow of the tissue beside it along.
+    veiled = [
+        np.rint(continued(f.astype(np.float32), ~h)).clip(0, 255).astype(np.uint8)
+        for f, h in zip(rgb, hole, strict=True)
+    ]
     to_next, to_last = [], [still]
     for t in range(len(rgb) - 1):
         progress(len(rgb) * 0.5 * t / len(rgb), len(rgb), "following the tissue")
-        there, back = dense_flow(rgb[t], rgb[t + 1]), dense_flow(rgb[t + 1], rgb[t])
+        there, back = dense_flow(veiled[t], veiled[t + 1]), dense_flow(veiled[t + 1], veiled[t])
         to_next.append(behind(there, back, hole[t], hole[t + 1]))
         to_last.append(behind(back, there, hole[t + 1], hole[t]))
     return [*to_next, still], to_last

@@ -14,7 +14,7 @@ def features(rgb: np.ndarray) -> np.ndarray:
 
     Ratios do not change when a surface turns from the lamp; red over green tells blood-filled tissue from metal.
     """
-    level = cv2.GaussianBlur(rgb, (0, 0), 0.7).astype(np.float32) + OFFSET
+    level = cv2.GaussianBlur(rgb, (0, 0), 0.5).astype(np.float32) + OFFSET
     red, green, blue = level[..., 0], level[..., 1], level[..., 2]
     return np.stack([np.log(red / green), np.log(green / blue), np.log(level.max(-1))], -1)
 
