@@ -7,7 +7,7 @@ import torch
 from surgisim.gaussians.adam import FIRST, SECOND, TINY, Adam
 from surgisim.gaussians.densify import ATTRIBUTES, Record, renew
 from surgisim.gaussians.observations import observe
-from surgisim.gaussians.schedule import phase_at, rate_at
+from surgisim.gaussians.schedule import PHASES, phase_at, rate_at
 from surgisim.problem import Problem
 
 
@@ -112,3 +112,12 @@ def test_the_bound_on_their_number_holds():
     adam, record = crowd(20), Record.empty(20)
     record.shown += 1
     assert renew(adam, record, most=23, share=1.0, widest=9.0) == 23
+
+
+def test_the_four_phases_are_those_of_the_paper():
+    assert [(p.moves_canonical, p.moves_field, p.trajectory) for p in PHASES] == [
+        (True, True, False),
+        (True, True, True),
+        (False, True, True),
+        (True, False, False),
+    ]
