@@ -6,8 +6,11 @@
 
 b_p holds anchored particles (a grip, the base) to their path by a spring per unit of mass,
 so that the constraint acts on the interpolated motion of the driven volume itself and not on
-whole nodes, which would widen it by up to a cell. Both passes only gather: every node sums over its
-own links in a fixed order, so results do not depend on the number of threads.
+whole nodes, which would widen it by up to a cell.
+
+On a GPU both passes only gather: every node sums over its own links in a fixed order, so results do
+not depend on the number of threads. On a CPU, where a launch is one thread, particles add straight
+into the nodes instead: as repeatable, and without fetching every stress 27 times.
 
 State lives in a ring of slots, (L, N): slot n % L is read and slot (n + 1) % L written, which
 serves a plain run (L = 2) and a recorded segment (L = steps + 1) alike.
@@ -66,18 +69,32 @@ class Anchors:
     stiffness: float
 
 
-@wp.kernel
-def node_step(
-    clock: wp.array(dtype=int),
+@wp.kernel(enable_backward=False)
+def node_gather(
     start: wp.array(dtype=int),
     entry: wp.array(dtype=int),
     link: wp.array2d(dtype=wp.vec4),
     stress: wp.array(dtype=wp.mat33),
     push: wp.array(dtype=wp.vec3),
+    force: wp.array(dtype=wp.vec3),
+):
+    i = wp.tid()
+    total = wp.vec3()
+    for e in range(start[i], start[i + 1]):
+        p = entry[e] / link.shape[1]
+        w = link[p, entry[e] - p * link.shape[1]]
+        total += w[0] * push[p] - stress[p] * wp.vec3(w[1], w[2], w[3])
+    force[i] = total
+
+
+@wp.kernel(enable_backward=False)
+def node_step(
+    clock: wp.array(dtype=int),
     mass: wp.array(dtype=float),
     gravity: wp.vec3,
     dt: float,
     slots: int,
+    force: wp.array(dtype=wp.vec3),
     u: wp.array2d(dtype=wp.vec3),
     v: wp.array2d(dtype=wp.vec3),
 ):
@@ -85,23 +102,19 @@ def node_step(
     n = clock[0]
     here = n % slots
     there = (n + 1) % slots
-    force = wp.vec3()
-    for e in range(start[i], start[i + 1]):
-        p = entry[e] / link.shape[1]
-        w = link[p, entry[e] - p * link.shape[1]]
-        force += w[0] * push[p] - stress[p] * wp.vec3(w[1], w[2], w[3])
-    speed = v[here, i] + dt * (force / mass[i] + gravity)
+    speed = v[here, i] + dt * (force[i] / mass[i] + gravity)
     v[there, i] = speed
     u[there, i] = u[here, i] + dt * speed
+    force[i] = wp.vec3()
 
 
-@wp.kernel
+@wp.kernel(enable_backward=False)
 def tick(clock: wp.array(dtype=int), by: int):
     clock[0] = clock[0] + by
     clock[1] = clock[1] + by
 
 
-@wp.kernel
+@wp.kernel(enable_backward=False)
 def node_adjoint_before(
     mass: wp.array(dtype=float),
     dt: float,
@@ -115,8 +128,8 @@ def node_adjoint_before(
     f_bar[i] = (dt / mass[i]) * total
 
 
-@wp.kernel
-def node_adjoint_after(
+@wp.kernel(enable_backward=False)
+def node_adjoint_gather(
     start: wp.array(dtype=int),
     entry: wp.array(dtype=int),
     link: wp.array2d(dtype=wp.vec4),
@@ -140,8 +153,8 @@ def node_adjoint_after(
 
 
 @cache
-def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
-    """`step`, `adjoint` and `look` over particles, compiled for these laws."""
+def particle_kernels(names: tuple[str, ...], scatter: bool) -> SimpleNamespace:
+    """`step` and `adjoint` over particles, compiled for these laws; `scatter` into nodes, or leave that to a gather."""
     terms = choose(names, "the laws of a simulation")
     columns = sum(len(t.params) for t in terms.values())
     total, read, work = fold(terms), gather(columns), power(terms)
@@ -160,6 +173,7 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
         v: wp.array2d(dtype=wp.vec3),
         stress: wp.array(dtype=wp.mat33),
         push: wp.array(dtype=wp.vec3),
+        force: wp.array(dtype=wp.vec3),
         trouble: wp.array(dtype=int),
     ):
         p = wp.tid()
@@ -173,9 +187,9 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
         inverse = wp.inverse(F)
         L = Fdot * inverse
         D = 0.5 * (L + wp.transpose(L))
-        stress[p] = (volume[p] * J) * total(F, D, read(theta, p)) * wp.transpose(inverse)
+        piola = (volume[p] * J) * total(F, D, read(theta, p)) * wp.transpose(inverse)
         held = anchors.member[p]
-        force = wp.vec3()
+        pull = wp.vec3()
         if held > 0:
             n = clock[1]
             x = wp.vec3()
@@ -185,8 +199,14 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
                     if located == 0:
                         x = carried(u, index, link, slot, p)
                         located = 1
-                    force += anchors.stiffness * (anchors.path[a, n] - x)
-        push[p] = weight[p] * force
+                    pull += (weight[p] * anchors.stiffness) * (anchors.path[a, n] - x)
+        if wp.static(scatter):
+            for k in range(index.shape[1]):
+                w = link[p, k]
+                wp.atomic_add(force, index[p, k], w[0] * pull - piola * wp.vec3(w[1], w[2], w[3]))
+        else:
+            stress[p] = piola
+            push[p] = pull
 
     @wp.kernel(module="unique", enable_backward=False)
     def adjoint(
@@ -204,6 +224,8 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
         F_bar: wp.array(dtype=wp.mat33),
         Fdot_bar: wp.array(dtype=wp.mat33),
         x_bar: wp.array(dtype=wp.vec3),
+        u_bar: wp.array(dtype=wp.vec3),
+        v_bar: wp.array(dtype=wp.vec3),
         theta_bar: wp.array2d(dtype=float),
     ):
         p = wp.tid()
@@ -218,8 +240,6 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
             b += w[0] * f
         mine = read(theta, p)
         dF, dFdot, dtheta, _dA = wp.grad(work)(F, Fdot, mine, volume[p] * A)
-        F_bar[p] = dF
-        Fdot_bar[p] = dFdot
         for m in range(wp.static(columns)):
             theta_bar[p, m] = theta_bar[p, m] + dtheta[m]
         held = anchors.member[p]
@@ -228,6 +248,16 @@ def particle_kernels(names: tuple[str, ...]) -> SimpleNamespace:
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.active[a, clock[1]] == 1:
                     spring += weight[p]
-        x_bar[p] = (-anchors.stiffness * spring) * b
+        dx = (-anchors.stiffness * spring) * b
+        if wp.static(scatter):
+            for k in range(index.shape[1]):
+                w = link[p, k]
+                g = wp.vec3(w[1], w[2], w[3])
+                wp.atomic_add(u_bar, index[p, k], dF * g + w[0] * dx)
+                wp.atomic_add(v_bar, index[p, k], dFdot * g)
+        else:
+            F_bar[p] = dF
+            Fdot_bar[p] = dFdot
+            x_bar[p] = dx
 
     return SimpleNamespace(step=step, adjoint=adjoint, columns=columns)

@@ -16,7 +16,15 @@ from surgisim.mpm.cut import Cut
 from surgisim.mpm.extension import extension
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
-from surgisim.mpm.kernels import Anchors, node_adjoint_after, node_adjoint_before, node_step, particle_kernels, tick
+from surgisim.mpm.kernels import (
+    Anchors,
+    node_adjoint_before,
+    node_adjoint_gather,
+    node_gather,
+    node_step,
+    particle_kernels,
+    tick,
+)
 from surgisim.problem import Problem
 
 wp.config.quiet = True
@@ -78,7 +86,9 @@ class Simulator:
         self.push = wp.zeros(self.count, dtype=wp.vec3, device=device)
         self.clock = wp.zeros(2, dtype=int, device=device)
         self.trouble = put(np.array([NEVER, 0]), int)
-        self.kernels = particle_kernels(self.terms)
+        self.force = wp.zeros(len(self.place), dtype=wp.vec3, device=device)
+        self.scatter = not wp.get_device(device).is_cuda
+        self.kernels = particle_kernels(self.terms, self.scatter)
 
     # Forward
 
@@ -227,28 +237,29 @@ class Simulator:
         return wp.launch(kernel, self.count, common + rest, device=self.device, record_cmd=True)
 
     def _commands(self, theta, anchors, dt, slots, u, v):
-        nodes = [self.clock, self.start, self.entry, self.link, self.stress, self.push, self.mass, self.gravity]
-        return [
-            self._particles(self.kernels.step, theta, anchors, slots, u, v, [self.stress, self.push, self.trouble]),
-            wp.launch(node_step, len(self.place), [*nodes, dt, slots, u, v], device=self.device, record_cmd=True),
-            wp.launch(tick, 1, [self.clock, 1], device=self.device, record_cmd=True),
-        ]
+        launch = {"device": self.device, "record_cmd": True}
+        outs = [self.stress, self.push, self.force, self.trouble]
+        particles = self._particles(self.kernels.step, theta, anchors, slots, u, v, outs)
+        nodes = [self.clock, self.mass, self.gravity, dt, slots, self.force, u, v]
+        step = wp.launch(node_step, len(self.place), nodes, **launch)
+        forward = wp.launch(tick, 1, [self.clock, 1], **launch)
+        if self.scatter:
+            return [particles, step, forward]
+        links = [self.start, self.entry, self.link, self.stress, self.push, self.force]
+        return [particles, wp.launch(node_gather, len(self.place), links, **launch), step, forward]
 
     def _adjoint_commands(self, theta, anchors, dt, slots, u, v, ub, vb, theta_bar):
+        launch = {"device": self.device, "record_cmd": True}
         fb, xb = (wp.zeros(n, dtype=wp.vec3, device=self.device) for n in (len(self.place), self.count))
         Fb, Gb = (wp.zeros(self.count, dtype=wp.mat33, device=self.device) for _ in range(2))
-        launch = {"device": self.device, "record_cmd": True}
-        return [
-            wp.launch(tick, 1, [self.clock, -1], **launch),
-            wp.launch(node_adjoint_before, len(self.place), [self.mass, dt, ub, vb, fb], **launch),
-            self._particles(self.kernels.adjoint, theta, anchors, slots, u, v, [fb, Fb, Gb, xb, theta_bar]),
-            wp.launch(
-                node_adjoint_after,
-                len(self.place),
-                [self.start, self.entry, self.link, Fb, Gb, xb, ub, vb],
-                **launch,
-            ),
-        ]
+        backward = wp.launch(tick, 1, [self.clock, -1], **launch)
+        before = wp.launch(node_adjoint_before, len(self.place), [self.mass, dt, ub, vb, fb], **launch)
+        outs = [fb, Fb, Gb, xb, ub, vb, theta_bar]
+        particles = self._particles(self.kernels.adjoint, theta, anchors, slots, u, v, outs)
+        if self.scatter:
+            return [backward, before, particles]
+        links = [self.start, self.entry, self.link, Fb, Gb, xb, ub, vb]
+        return [backward, before, particles, wp.launch(node_adjoint_gather, len(self.place), links, **launch)]
 
     def _advance(self, commands, steps: int) -> None:
         for _ in range(steps):
