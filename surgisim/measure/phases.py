@@ -14,7 +14,7 @@ def phases(motion: Motion, *, still: float = 0.05) -> np.ndarray:
     """Phase of each frame, (T,) str.
 
     A frame loads when a holding grip moves faster than `still` times its fastest; a hold is any
-    other frame with a grip; without a grip it is rest before the first and released after it.
+    later frame with a grip; all is at rest before the first load, and released without a grip after one.
     """
     j, count = motion.active.shape
     held = motion.active.any(0)
@@ -24,5 +24,5 @@ def phases(motion: Motion, *, still: float = 0.05) -> np.ndarray:
         speed[1:] = np.linalg.norm(np.diff(motion.position[i], axis=0), axis=-1)
         speed[~motion.active[i]] = 0
         loading |= speed > still * max(speed.max(initial=0), 1e-12)
-    after = np.cumsum(held) > 0
-    return np.select([loading & held, held, after], ["load", "hold", "released"], "rest")
+    loaded, after = np.cumsum(loading) > 0, np.cumsum(held) > 0
+    return np.select([loading & held, held & loaded, after & ~held], ["load", "hold", "released"], "rest")

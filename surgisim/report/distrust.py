@@ -106,7 +106,9 @@ def _physics(story: Story) -> Iterator[Doubt]:
             f"This clip cannot tell {', '.join(unknown)}: what is given is where the search stood, not a measurement.",
         )
     fitted, default = story.value("simulation", "fit_fitted"), story.value("simulation", "fit_default")
-    if fitted is not None and default is not None and fitted >= default:
+    if not story.run.fit.history:
+        yield Doubt(False, "No parameter was fitted: the replay runs with default or given numbers.")
+    elif fitted is not None and default is not None and fitted >= default:
         yield Doubt(True, "The fitted parameters predict unseen frames no better than the default ones.")
 
 
@@ -122,11 +124,11 @@ def _replay(story: Story) -> Iterator[Doubt]:
         yield Doubt(True, "The replay was not rendered over the recording's frames, so pictures cannot be compared.")
     for kind, words in (("true", "true"), ("tracked", "tracked")):
         for part, when in (("used", "used frames"), ("released", "frames after the release")):
-            value = story.value("simulation", f"{kind}_{part}_moving")
-            still = story.value("simulation", f"{kind}_{part}_moving_still")
+            value = story.value("simulation", f"{kind}_{part}_moving_px")
+            still = story.value("simulation", f"{kind}_{part}_moving_still_px")
             if value is not None and still is not None and value >= still:
                 yield Doubt(
                     True,
                     f"On {when} the replay follows the {words} points no better than a body that never moves "
-                    f"({shown(value)} against {shown(still)} mm).",
+                    f"({shown(value)} against {shown(still)} px).",
                 )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surgisim.report.overlay import enlarged
-from surgisim.report.uri import data_uri
+from surgisim.report.uri import data_uri, jpeg
 from surgisim.video import mp4
 
 GAP = 8
@@ -19,19 +19,20 @@ class Film:
     """One a panel, left to right."""
     width: int
     height: int
-    note: str = ""
+    still: str = ""
+    """One frame as a picture, for paper."""
     bar: tuple[str, str, str, str] | None = None
     """Colour bar: CSS gradient, low end, high end, label."""
 
 
-def strip(panels: dict[str, np.ndarray], fps: float, width: int, quality: int, **more) -> Film:
-    """Panels (T, H, W, 3) uint8 by caption, side by side, each `width` [px] wide."""
+def strip(panels: dict[str, np.ndarray], width: int, **more) -> Film:
+    """Panels (T, H, W, 3) uint8 by caption, side by side, each `width` [px] wide; the rest as in `joined`."""
     wide = [np.stack([enlarged(f, width) for f in frames]) for frames in panels.values()]
-    return joined(dict(zip(panels, wide, strict=True)), fps, quality, **more)
+    return joined(dict(zip(panels, wide, strict=True)), **more)
 
 
-def joined(panels: dict[str, np.ndarray], fps: float, quality: int, **more) -> Film:
-    """Panels that already have their size; shorter ones are centred on white."""
+def joined(panels: dict[str, np.ndarray], *, fps: float, quality: int, paper: int, bar=None) -> Film:
+    """Panels that already have their size; shorter ones are centred on white. Frame `paper` is printed."""
     tall = max(p.shape[1] for p in panels.values())
     parts: list[np.ndarray] = []
     for panel in panels.values():
@@ -40,4 +41,5 @@ def joined(panels: dict[str, np.ndarray], fps: float, quality: int, **more) -> F
         parts += [np.pad(panel, room, constant_values=255), np.full((len(panel), tall, GAP, 3), 255, np.uint8)]
     frames = np.concatenate(parts[:-1], 2)
     content = mp4(frames, fps, quality=quality)
-    return Film(data_uri(content, "video/mp4"), tuple(panels), frames.shape[2], frames.shape[1], **more)
+    still = jpeg(frames[min(paper, len(frames) - 1)])
+    return Film(data_uri(content, "video/mp4"), tuple(panels), frames.shape[2], frames.shape[1], still, bar)

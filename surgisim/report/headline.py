@@ -80,19 +80,19 @@ def _reconstruction(story: Story) -> list[Card | None]:
 
 def _simulation(story: Story) -> list[Card | None]:
     for kind, words in (("true", "true points"), ("tracked", "tracked points")):
-        value = story.value("simulation", f"{kind}_held_out_moving")
-        still = story.value("simulation", f"{kind}_held_out_moving_still")
+        value = story.value("simulation", f"{kind}_held_out_moving_px")
+        still = story.value("simulation", f"{kind}_held_out_moving_still_px")
         if value is None or still is None:
             continue
-        beside = f"moving {words}, frames never used; {shown(still)} if nothing moved"
-        card = _card(story, "Replay's motion", "simulation", f"{kind}_held_out_moving", beside, _mark(value < still))
+        beside = f"off moving {words}, frames never used; {shown(still)} if nothing moved"
+        card = _card(story, "Replay's motion", "simulation", f"{kind}_held_out_moving_px", beside, _mark(value < still))
         return [card, _fit(story)]
     return [_fit(story)]
 
 
 def _fit(story: Story) -> Card | None:
     fitted, default = story.value("simulation", "fit_fitted"), story.value("simulation", "fit_default")
-    if fitted is None or default is None:
+    if fitted is None or default is None or not story.run.fit.history:
         return None
     beside = f"track error, frames never used; default parameters {shown(default)}"
     return _card(story, "Fitted physics", "simulation", "fit_fitted", beside, _mark(fitted < default))

@@ -49,7 +49,7 @@ def template(name: str) -> jinja2.Template:
 
 def films(story: Story) -> list[tuple[str, Film]]:
     """Title and film, in the order of the page."""
-    run, fps, settings = story.run, story.run.camera.fps, story.settings
+    run, settings = story.run, story.settings
     whole = range(run.camera.frames)
     beside = {"recording": run.frames.rgb, "reconstruction": run.rendered.rgb}
     if story.replayed:
@@ -68,11 +68,9 @@ def films(story: Story) -> list[tuple[str, Film]]:
     }
     box = (round(1.4 * settings.panel), settings.panel)
     bar = (gradient(DEPTH), f"{1e3 * low:.0f}", f"{1e3 * high:.0f}", f"depth along the view [{unit}]")
+    how = {"fps": run.camera.fps, "quality": settings.quality, "paper": story.moments[len(story.moments) // 2]}
     return [
-        ("Recorded, reconstructed, replayed", strip(beside, fps, settings.panel, settings.quality)),
-        (
-            "The replay from where no camera was",
-            side_film(story, box, settings.quality),
-        ),
-        ("What the stages saw", strip(seen, fps, zoom, settings.quality, bar=bar)),
+        ("Recorded, reconstructed, replayed", strip(beside, settings.panel, **how)),
+        ("The replay from where no camera was", side_film(story, box, **how)),
+        ("What the stages saw", strip(seen, zoom, bar=bar, **how)),
     ]

@@ -104,7 +104,7 @@ def section(story: Story) -> np.ndarray:
     return np.abs(x - at) <= 1.25 * run.body.spacing
 
 
-def side_film(story: Story, size: tuple[int, int], quality: int) -> Film:
+def side_film(story: Story, size: tuple[int, int], **how) -> Film:
     """The replay from where no camera was: turned, and cut open with its displacement in colour."""
     run = story.run
     rest, position = run.body.rest.astype(float), run.replay.position.astype(float)
@@ -117,12 +117,12 @@ def side_film(story: Story, size: tuple[int, int], quality: int) -> Film:
         "turned by 40° and lifted by 25°; held particles in pink": _frames(
             position, np.broadcast_to(colors(story), position.shape), _radius(story), oblique
         ),
-        "cut open at the grip, seen from the side: how far each particle is from its rest": _frames(
+        "cut open at the grip, seen from the side: how far each particle has moved": _frames(
             position[:, cut], mapped(moved[:, cut], 0, top, MOVED).astype(float), _radius(story), flank
         ),
     }
     bar = (gradient(MOVED), "0", f"{1e3 * top:.1f}", f"displacement [{_unit(story)}]")
-    return joined(panels, run.camera.fps, quality, bar=bar)
+    return joined(panels, bar=bar, **how)
 
 
 def _frames(position: np.ndarray, color: np.ndarray, radius: float, view: View) -> np.ndarray:
@@ -130,7 +130,7 @@ def _frames(position: np.ndarray, color: np.ndarray, radius: float, view: View) 
 
 
 def _radius(story: Story) -> float:
-    return 0.62 * spacing(story.run.body.rest)
+    return 0.72 * spacing(story.run.body.rest)
 
 
 def _unit(story: Story) -> str:

@@ -1,8 +1,9 @@
-"""Particles seen from where no camera was: painted balls, the far ones first."""
+"""Particles seen from where no camera was: painted balls, the nearest in front."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 
 @dataclass(frozen=True)
@@ -51,19 +52,27 @@ def look(points: np.ndarray, yaw: float, pitch: float, size: tuple[int, int], ma
 
 def balls(points: np.ndarray, color: np.ndarray, radius: float, view: View) -> np.ndarray:
     """Picture (H, W, 3) uint8 on white of balls of one radius [m]: points (Q, 3), colour (Q, 3) 0-255."""
-    pixels, far = view.place(points)
-    size = max(radius * view.zoom, 0.75)
-    reach = int(np.ceil(size))
-    dy, dx = (a.ravel() for a in np.mgrid[-reach : reach + 1, -reach : reach + 1])
-    x, y = np.rint(pixels[:, 0]).astype(int), np.rint(pixels[:, 1]).astype(int)
-    from_center = ((x[:, None] + dx - pixels[:, :1]) ** 2 + (y[:, None] + dy - pixels[:, 1:]) ** 2) / size**2
-    column, row = x[:, None] + dx, y[:, None] + dy
-    hit = (from_center <= 1) & (column >= 0) & (column < view.width) & (row >= 0) & (row < view.height)
-    who = np.broadcast_to(np.arange(len(points))[:, None], hit.shape)[hit]
-    rise = np.sqrt(1 - from_center[hit])
-    # The nearest part of a ball wins the pixel: paint far to near.
-    order = np.argsort(-(far[who] - radius * rise), kind="stable")
+    pixels, far = view.place(np.asarray(points, float))
     picture = np.full((view.height, view.width, 3), 255, np.uint8)
-    shaded = color[who] * (0.55 + 0.45 * rise)[:, None]
-    picture[row[hit][order], column[hit][order]] = shaded[order].clip(0, 255).astype(np.uint8)
+    nearest = np.full(picture.shape[:2], np.inf)
+    _paint(picture, nearest, pixels, far, np.asarray(color, float), radius, max(radius * view.zoom, 0.75))
     return picture
+
+
+@njit(cache=True)
+def _paint(picture, nearest, pixels, far, color, radius, size):
+    """Every pixel keeps the ball whose skin is nearest; a ball is darker towards its rim."""
+    height, width = nearest.shape
+    for q in range(len(pixels)):
+        x, y = pixels[q]
+        for row in range(max(int(np.ceil(y - size)), 0), min(int(np.floor(y + size)), height - 1) + 1):
+            for column in range(max(int(np.ceil(x - size)), 0), min(int(np.floor(x + size)), width - 1) + 1):
+                off = ((column - x) ** 2 + (row - y) ** 2) / size**2
+                if off > 1:
+                    continue
+                rise = np.sqrt(1 - off)
+                skin = far[q] - radius * rise
+                if skin < nearest[row, column]:
+                    nearest[row, column] = skin
+                    for c in range(3):
+                        picture[row, column, c] = np.uint8(min(max(color[q, c] * (0.55 + 0.45 * rise), 0.0), 255.0))

@@ -86,7 +86,7 @@ def test_a_grasp_found_beside_and_too_late_says_by_how_much():
 
 
 def test_a_clip_rests_is_loaded_is_held_and_let_go():
-    assert " ".join(dict.fromkeys(phases(motion()))) == "rest hold load released"
+    assert " ".join(dict.fromkeys(phases(motion()))) == "rest load hold released"
     assert phases(motion())[[0, 4, 7, 9]].tolist() == ["rest", "load", "hold", "released"]
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from surgisim.report.charts.paper import address, sheet
+from surgisim.report.charts.paper import address, plain_ticks, sheet
 from surgisim.report.palette import INK, MUTED, RECONSTRUCTION, REPLAY
 
 COLORS = (RECONSTRUCTION, REPLAY, "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -36,7 +36,7 @@ def fit(history: list[dict[str, Any]]) -> str | None:
                 right.plot(at, values / first, "o-", ms=3, color=COLORS[k % len(COLORS)], label=name)
         right.set_ylabel("parameter / its first value [1]")
         right.set_yscale("log")
-        _plain_ticks(right)
+        plain_ticks(right)
         right.legend(loc="best")
         for axes in (left, right):
             axes.set_xlabel("step")
@@ -66,11 +66,3 @@ def field(history: list[dict[str, Any]]) -> str | None:
         axes.xaxis.get_major_locator().set_params(integer=True)
         axes.legend(loc="best")
         return address(figure)
-
-
-def _plain_ticks(axes) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())

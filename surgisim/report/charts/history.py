@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from surgisim.report.charts.paper import address, sheet, thousands
+from surgisim.report.charts.paper import address, plain_ticks, sheet, thousands
 from surgisim.report.palette import MUTED, RECONSTRUCTION, REPLAY
 
 NAMES = ("coarse", "trajectory", "refine", "canonical")
@@ -24,7 +24,10 @@ def history(rows: np.ndarray) -> str:
             top = axes.get_xaxis_transform()
             middle = (span[0] + end) / 2
             axes.text(middle, 1.015, name, transform=top, ha="center", va="bottom", fontsize=7.5, color=MUTED)
-        axes.plot(at, quality, color=RECONSTRUCTION)
+        many = len(rows) > 40
+        if many:  # a step's PSNR is that of one frame, so it jumps from frame to frame
+            axes.plot(at, quality, color=RECONSTRUCTION, lw=0.6, alpha=0.35)
+        axes.plot(at, _steady(quality) if many else quality, color=RECONSTRUCTION)
         axes.set_xlabel("iteration")
         axes.set_ylabel("PSNR on used frames [dB]", color=RECONSTRUCTION)
         axes.set_xlim(at[0], at[-1])
@@ -32,8 +35,14 @@ def history(rows: np.ndarray) -> str:
         other = axes.twinx()
         other.grid(False)
         other.spines["right"].set_visible(True)
-        other.plot(at, loss, color=REPLAY, lw=1.1, ls=(0, (4, 1.5)))
+        other.plot(at, _steady(loss) if many else loss, color=REPLAY, lw=1.1, ls=(0, (4, 1.5)))
         other.set_ylabel("loss [1]", color=REPLAY)
         if (loss > 0).all():
             other.set_yscale("log")
+            plain_ticks(other)
         return address(figure)
+
+
+def _steady(values: np.ndarray, reach: int = 7) -> np.ndarray:
+    """Running median over 2 `reach` + 1 rows, fewer at the ends."""
+    return np.array([np.median(values[max(k - reach, 0) : k + reach + 1]) for k in range(len(values))])

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from surgisim.report.palette import INK, LINE, MUTED, PHASE
 from surgisim.report.uri import data_uri, jpeg
@@ -95,3 +96,10 @@ def mark_held_out(axes: Axes, time: np.ndarray, values: np.ndarray, split: np.nd
 
 def thousands(axes: Axes) -> None:
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
+
+
+def plain_ticks(axes: Axes) -> None:
+    """Numbers without powers of ten along a logarithmic y axis."""
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
