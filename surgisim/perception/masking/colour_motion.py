@@ -8,12 +8,13 @@ frames along the optical flow. Points marked by the user count for more than any
 import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
+from skimage.filters import threshold_otsu
 
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.given import Given
 from surgisim.config.masking import Masking
 from surgisim.perception.flow import agrees, carry, dense_flow
-from surgisim.perception.masking.appearance import features, highlights, lit
+from surgisim.perception.masking.appearance import OFFSET, features, highlights, lit
 from surgisim.perception.masking.settling import settled
 from surgisim.perception.masking.shape import bridged, entering, snapped, solid
 
@@ -21,6 +22,8 @@ BINS = 24
 LOW, HIGH = np.array([-0.7, -1.0, 2.0]), np.array([1.2, 1.0, 5.6])
 """Range of the features that the colour tables cover."""
 ROUNDS = 4
+FULL = 3.9
+"""Evidence of a colour that could not be clearer: the logarithm of the odds."""
 
 
 def tool(frames: Frames, given: Given, settings: Masking, progress) -> tuple[np.ndarray, np.ndarray]:
@@ -55,19 +58,21 @@ def tool(frames: Frames, given: Given, settings: Masking, progress) -> tuple[np.
 
 
 def _by_redness(seen: np.ndarray) -> np.ndarray:
-    """Evidence for instrument (> 0) or tissue (< 0) from red over green alone, (T, H, W)."""
-    red = seen[..., 0]
-    sample = red[:: max(len(red) // 12, 1)]
-    blooded = sample[sample > 0.08]
+    """Evidence for instrument (> 0) or tissue (< 0) from red over green, (T, H, W)."""
+    red, brightness = seen[..., 0], seen[..., 2]
+    some = slice(None, None, max(len(red) // 12, 1))
+    blooded = red[some][red[some] > 0.08]
     typical = float(np.median(blooded)) if len(blooded) else 0.3
     level = 0.4 * typical
-    # Pale tissue: where most of the picture would count as instrument, only what is paler still does.
-    if (sample < level).mean() > 0.3:
-        level = min(level, float(np.quantile(sample, 0.12)))
-    evidence = 3 * np.clip((level - red) / (0.2 * typical), -1.3, 1.3)
+    evidence = FULL * np.clip((level - red) / (0.26 * typical), -1, 1)
+    bloodless = red[some] < level
+    if bloodless.mean() > 0.3:
+        # So much cannot be instrument: the tissue is pale here (fat, fascia), and pale tissue is bright.
+        dark = float(threshold_otsu(brightness[some][bloodless]))
+        evidence = np.minimum(evidence, FULL * np.clip((dark - brightness) / 0.2, -1, 1))
     # Burnt-out white has lost its colour, and black never had any.
-    brightness = np.exp(seen[..., 2]) - 8
-    return evidence * np.clip((brightness - 4) / 16, 0.1, 1) * np.where(brightness > 240, 0.2, 1)
+    shown = np.exp(brightness) - OFFSET
+    return evidence * np.clip((shown - 4) / 16, 0.1, 1) * np.where(shown > 240, 0.2, 1)
 
 
 def _bins(seen: np.ndarray) -> np.ndarray:
