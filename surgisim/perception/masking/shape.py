@@ -58,13 +58,13 @@ def _is_instrument(region: np.ndarray, inward: np.ndarray, count: int, size: tup
 
 
 def _without_islands(mask, evidence, highlight, inward, chosen) -> np.ndarray:
-    """Takes out pieces that neither reach the border nor lie beside one that does, unless large and dull, (H, W)."""
+    """Takes out highlights, and pieces that neither reach the border nor lie beside one that does unless large."""
     number, label, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     area = np.maximum(stats[:, 4], 1)
     shine = np.bincount(label.ravel(), highlight.ravel(), number) / area
     clear = np.bincount(label.ravel(), evidence.ravel(), number) / area
     contact = np.bincount(label.ravel(), (inward <= 2).ravel(), number) > 0
-    kept = contact | ((area > 0.002 * mask.size) & (shine < 0.6))
+    kept = (contact & ((shine < 0.9) | (area > 0.01 * mask.size))) | ((area > 0.002 * mask.size) & (shine < 0.6))
     kept |= np.bincount(label.ravel(), chosen.ravel(), number) > 0
     kept[0] = False
     gap = 2 * max(mask.shape[1] // 80, 2) + 1
