@@ -3,14 +3,13 @@
 Wang, Yang, Zhao, Yang and Shen, Realistic surgical simulation from monocular videos, section 3.2.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numba
 import numpy as np
 import torch
-from torch.nn.functional import avg_pool2d
 
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.deformation import Deformation
@@ -20,29 +19,12 @@ from surgisim.artifacts.inpainted import Inpainted
 from surgisim.artifacts.masks import Masks
 from surgisim.artifacts.scene import Scene
 from surgisim.config.reconstruction import Reconstruction
-from surgisim.deformation.field import Field, deform, save_field, still_field
-from surgisim.deformation.smoothness import roughness
-from surgisim.gaussians.adam import Adam
+from surgisim.deformation.field import Field, deform, save_field
 from surgisim.gaussians.attributes import drawn
-from surgisim.gaussians.densify import ATTRIBUTES, Record, renew
+from surgisim.gaussians.fit import Fit, Say
 from surgisim.gaussians.initialise import initialise
-from surgisim.gaussians.losses import anisotropic, masked_l1, trajectory
-from surgisim.gaussians.neighbours import groups
-from surgisim.gaussians.observations import Observations, observe
-from surgisim.gaussians.rasterise import Image, rasterise, render, to_bytes
-from surgisim.gaussians.schedule import Phase, phase_at, rate_at
-from surgisim.problem import Problem
-
-RENEWALS = (0.1, 0.2, 0.3, 0.4)
-"""When Gaussians are dropped and split, all in the coarse phase [fraction of iterations]."""
-SPLIT = 0.1
-"""Largest share of the Gaussians split at once."""
-WIDEST = 10.0
-"""Largest radius kept [median first radius]."""
-REPORTS = 100
-"""Rows of the history."""
-
-Say = Callable[[float, float, str], None]
+from surgisim.gaussians.observations import observe
+from surgisim.gaussians.rasterise import render, to_bytes
 
 
 @dataclass(frozen=True)
@@ -102,159 +84,3 @@ def threads(count: int) -> Iterator[None]:
 def picture(scene: Scene, field: Field, camera: Camera, frame: int) -> np.ndarray:
     """A frame of the clip, re-rendered, sRGB 0-255, (H, W, 3) uint8."""
     return to_bytes(render(*drawn(deform(scene, field, frame / camera.fps)), camera).rgb)
-
-
-class Fit:
-    """The state of the optimisation."""
-
-    def __init__(self, start: Scene, seen: Observations, camera: Camera, length: int, settings: Reconstruction) -> None:
-        self.seen, self.camera, self.settings = seen, camera, settings
-        self.rng = np.random.default_rng(settings.seed)
-        self.field = first_field(start.mean, camera, length, settings, self.rng)
-        self.radius = float(np.exp(np.median(start.scale)))
-        self.most = min(settings.most_gaussians, int(settings.growth * len(start.mean)))
-        self.middle = float(np.median(start.mean[:, 2]))
-        self.head = [f"head_{i}" for i in range(len(self.field.head))]
-        tensors = {name: torch.from_numpy(getattr(start, name)) for name in ATTRIBUTES}
-        tensors |= {"planes": self.field.planes} | dict(zip(self.head, self.field.head, strict=True))
-        rates = {name: getattr(settings, f"rate_{name}") for name in (*ATTRIBUTES, "planes")}
-        rates |= dict.fromkeys(self.head, settings.rate_head)
-        self.adam = Adam(tensors, rates | {"mean": settings.rate_mean * self.field.reach})
-        self.groups: torch.Tensor | None = None
-        self.record = Record.empty(len(start.mean))
-
-    def run(self, progress: Say) -> np.ndarray:
-        """All iterations; returns the history, (R, 5)."""
-        total = self.settings.iterations
-        renewals = {round(share * total) for share in RENEWALS}
-        order, history, loss_sum, error_sum = [], [], [], []
-        for i in range(total):
-            phase = phase_at(i, total, self.settings.phases)
-            if not order:
-                order = self.rng.permutation(len(self.seen.frame)).tolist()
-            if i in renewals:
-                self.renew()
-            # Frame 0 is the rest scene: seen no oftener than others, the scene would settle where it is on average.
-            anchor = self.settings.rest_every and i % self.settings.rest_every == 0
-            loss, error = self.step(phase, 0 if anchor else order.pop(), i)
-            loss_sum.append(loss)
-            error_sum.append(error)
-            if len(loss_sum) >= max(total // REPORTS, 1) or i == total - 1:
-                psnr = -10 * np.log10(max(np.mean(error_sum), 1e-12))
-                count = len(self.adam.tensors["mean"])
-                history.append((i + 1, np.mean(loss_sum), psnr, count, phase.number))
-                progress(i + 1, total, f"{phase.name}: {psnr:.1f} dB, {count} Gaussians")
-                loss_sum, error_sum = [], []
-        return np.array(history, np.float32)
-
-    def step(self, phase: Phase, u: int, iteration: int) -> tuple[float, float]:
-        """One frame's loss, its gradients, one step; returns the loss and the mean squared error on seen tissue."""
-        adam = self.adam
-        adam.watch(
-            [*(ATTRIBUTES if phase.moves_canonical else ()), *(("planes", *self.head) if phase.moves_field else ())]
-        )
-        time = self.seen.frame[u] / self.camera.fps
-        field = self.current_field()
-        mean = adam.tensors["mean"]
-        moved, opacity, turn, grow = field(mean, time)
-        radius = (adam.tensors["scale"] + grow).exp()
-        probe = torch.zeros(len(mean), 2, requires_grad=True)
-        image = rasterise(
-            mean + moved,
-            adam.tensors["rotation"] + turn,
-            radius,
-            torch.sigmoid(adam.tensors["opacity"] + opacity),
-            adam.tensors["color"],
-            self.camera,
-            probe=probe,
-        )
-        loss = self.misfit(phase, image, u) + self.priors(phase, field, radius, moved, time)
-        if not torch.isfinite(loss):
-            raise Problem(
-                f"reconstruction: the loss is not finite at iteration {iteration}, frame {self.seen.frame[u]}. "
-                "Lower the step sizes (rate_mean, rate_planes, rate_head)."
-            )
-        loss.backward()
-        adam.advance(rate_at(iteration, self.settings.iterations, self.settings.rate_end))
-        self.record.add(probe.grad, image.weight)
-        whole = self.seen.weight[u] == 1
-        error = (image.rgb.detach() - self.seen.rgb[u])[whole].square().mean() if whole.any() else torch.zeros(())
-        return float(loss.detach()), float(error)
-
-    def misfit(self, phase: Phase, image: Image, u: int) -> torch.Tensor:
-        """Colour and depth of one frame against what was seen."""
-        seen, settings = self.seen, self.settings
-        color = masked_l1(image.rgb, seen.rgb[u], seen.weight[u])
-        if phase.number == 1 and settings.pooled:
-            wrong = ((image.rgb - seen.rgb[u]) * seen.weight[u][..., None]).permute(2, 0, 1)[None]
-            for share in settings.pooled_sizes:
-                block = max(round(share * max(seen.z.shape[1:])), 1)
-                color = color + settings.pooled * avg_pool2d(wrong, block, max(block // 2, 1)).abs().mean()
-        # sum w (z_i - z), so that a surface that is not yet opaque is not pushed away to make up for it.
-        depth = masked_l1(image.depth / self.middle, seen.z[u] / self.middle * image.alpha, seen.trust[u])
-        return color + settings.depth * depth
-
-    def priors(
-        self, phase: Phase, field: Field, radius: torch.Tensor, moved: torch.Tensor, time: float
-    ) -> torch.Tensor:
-        """What is asked of scene and field besides the picture."""
-        settings = self.settings
-        total = radius.new_zeros(())
-        if settings.anisotropy:
-            unit = settings.anisotropy_unit * self.radius
-            limits = {"r_m": settings.anisotropy_largest, "r_ani": settings.anisotropy_ratio}
-            total = total + settings.anisotropy * anisotropic(radius, unit=unit, **limits)
-        if phase.trajectory and settings.trajectory and time > 0:
-            if self.groups is None:
-                points = self.adam.tensors["mean"].detach().numpy()
-                self.groups = torch.from_numpy(groups(points, settings.neighbours))
-            before = field(self.adam.tensors["mean"], time - 1 / self.camera.fps)[0]
-            literal = settings.trajectory_form == "literal"
-            total = total + settings.trajectory * trajectory(
-                (moved - before) / self.radius, self.groups, literal=literal
-            )
-        if phase.moves_field:
-            space, rough = roughness(field.planes, field.layout)
-            total = total + settings.smoothness_space * space + settings.smoothness_time * rough
-        return total
-
-    def renew(self) -> None:
-        """Drop and split Gaussians."""
-        renew(self.adam, self.record, self.most, SPLIT, WIDEST * self.radius)
-        self.record = Record.empty(len(self.adam.tensors["mean"]))
-        self.groups = None
-
-    def current_field(self) -> Field:
-        """The field with the weights as they are now."""
-        head = tuple(self.adam.tensors[name] for name in self.head)
-        return replace(self.field, planes=self.adam.tensors["planes"], head=head)
-
-    def result(self) -> tuple[Scene, Field]:
-        """The canonical scene and the field."""
-        self.adam.watch(())
-        arrays = {name: self.adam.tensors[name].numpy().copy() for name in ATTRIBUTES}
-        arrays["rotation"] /= np.linalg.norm(arrays["rotation"], axis=1, keepdims=True)
-        return Scene(**arrays), self.current_field()
-
-
-def first_field(
-    mean: np.ndarray, camera: Camera, length: int, settings: Reconstruction, rng: np.random.Generator
-) -> Field:
-    """A still field over the scene's box and the clip's time; outliers lie outside the box and read its border."""
-    low, high = np.percentile(mean, [0.5, 99.5], axis=0).astype(float)
-    room = 0.02 * (high - low) + 1e-3 * np.max(high - low)
-    low, high = low - room, high + room
-    share = (high - low) / np.max(high - low)
-    groups = settings.knots, settings.knots_in_depth, settings.knots_in_time
-    if len({len(g) for g in groups}) != 1:
-        raise Problem(
-            f"reconstruction: knots {list(groups[0])}, knots_in_depth {list(groups[1])} and knots_in_time "
-            f"{list(groups[2])} must have one number a scale each."
-        )
-    sizes = [
-        [max(2, round(n * share[0])), max(2, round(n * share[1])), max(2, deep), max(2, round(often * length))]
-        for n, deep, often in zip(*groups, strict=True)
-    ]
-    duration = max(length - 1, 1) / camera.fps
-    corners = np.append(low, 0.0), np.append(high, duration)
-    return still_field(*corners, np.array(sizes), settings.channels, settings.head_width, rng)

@@ -57,9 +57,9 @@ def clip():
 @pytest.fixture
 def fit(clip):
     """A Fit at its start."""
+    from surgisim.gaussians.fit import Fit
     from surgisim.gaussians.initialise import initialise
     from surgisim.gaussians.observations import observe
-    from surgisim.gaussians.reconstruct import Fit
 
     seen = observe(clip.frames, clip.inpainted, clip.masks, clip.depth, clip.settings)
     start = initialise(clip.inpainted.rgb, clip.depth.z, clip.masks.tool, clip.masks.tissue, clip.camera, most=500)
