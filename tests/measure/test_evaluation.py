@@ -64,6 +64,16 @@ def test_a_body_that_never_moves_scores_as_if_nothing_moved(made):
         assert entries[f"true_{part}_moving"]["value"] == entries[f"true_{part}_moving_still"]["value"]
 
 
+def test_a_replay_of_another_length_is_not_held_against_the_recording(made):
+    replay = made["replay"]
+    halves = {
+        n: getattr(replay, n)[:8] for n in ("time", "position", "nodes", "smallest_volume_ratio", "energy", "rgb")
+    }
+    values = score(run_of(made, replay=dataclasses.replace(replay, **halves)), lpips=None, first=4)
+    assert not any(name.startswith("true") for name in values["simulation"])
+    assert "another manipulation" in values[NOT_MEASURED]["simulation.tracked_held_out"]["protocol"]
+
+
 def test_an_arbitrary_scale_costs_nothing_where_one_factor_explains_it(made, values):
     depth = dataclasses.replace(made["depth"], z=2 * made["depth"].z)
     found = score(run_of(made, depth=depth), lpips=None, first=4)["depth"]["true_relative"]["value"]

@@ -22,6 +22,11 @@ MOVING = 0.25
 
 
 def simulation(run: Run, lpips: Lpips | None) -> dict[str, dict[str, Any]]:
+    if len(run.replay.time) != run.camera.frames:
+        why_not = (
+            f"the replay has {len(run.replay.time)} frames, the recording {run.camera.frames}: another manipulation"
+        )
+        return _stated(run) | {"tracked_held_out": number(None, run.length_unit, "", why_not=why_not)}
     numbers = _tracked(run) | _true(run) | _stated(run)
     if len(run.replay.rgb) == len(run.frames.rgb):
         numbers |= table(pictures(run.replay.rgb, run, lpips), run, WHEN)
