@@ -20,6 +20,16 @@ class Contact:
     velocity: np.ndarray
     """The instrument's motion there to the next frame [px], NaN where there is none, (K, T, 2)."""
 
+    def mean_velocity(self, held: np.ndarray) -> np.ndarray:
+        """Its motion at points `held` (K,) to the next frame [px], NaN where it is not seen, (T, 2)."""
+        there = self.velocity[held]
+        out = np.full(there.shape[1:], np.nan)
+        for t in range(len(out)):
+            known = np.isfinite(there[:, t]).all(-1)
+            if known.any():
+                out[t] = np.median(there[known, t], axis=0)
+        return out
+
 
 def contact(rgb: np.ndarray, tool: np.ndarray, xy: np.ndarray) -> Contact:
     """rgb: sRGB (T, H, W, 3) uint8. tool: (T, H, W) bool. xy: tissue points [px], (K, T, 2)."""
@@ -58,4 +68,4 @@ def _near_tool(first: np.ndarray, second: np.ndarray, tool: np.ndarray, tool_nex
     radius = 0.05 * max(tool.shape)
     total = cv2.GaussianBlur(weight, (0, 0), radius)
     mean = cv2.GaussianBlur(flow * weight[..., None], (0, 0), radius)
-    return np.where(total[..., None] > 1e-4, mean / np.maximum(total, 1e-4)[..., None], np.nan).astype(np.float32)
+    return np.where(total[..., None] > 0.01, mean / np.maximum(total, 0.01)[..., None], np.nan).astype(np.float32)

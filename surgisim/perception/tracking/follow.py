@@ -51,9 +51,11 @@ def follow(
     cell = everywhere.size / len(queries)
     paths = _backend(settings.backend)(rgb, masks.tool, masks.specular, queries, settings=settings, progress=progress)
     source = "given" if grips else "found"
-    if not grips and settings.find_grasp:
-        grips = _found(rgb, masks, paths, max(rgb.shape[1:3]), cell)
-    motion = carry(grips, paths, depth, camera, source)
+    tool = contact(rgb, masks.tool, paths.xy) if masks.tool.any() else None
+    if not grips and settings.find_grasp and tool is not None:
+        moved = median_filter((paths.xy - paths.xy[:, :1]).astype(float), size=(1, 3, 1), mode="nearest")
+        grips = find(paths.xy[:, 0].astype(float), moved, paths.visible, tool, max(rgb.shape[1:3]), cell)
+    motion = carry(grips, paths, tool, depth, camera, source)
     _say(motion, camera, settings)
     keep = _choose(queries, usable, grips, settings)
     if not keep.any():
@@ -64,15 +66,6 @@ def follow(
 
 def _backend(name: str):
     return importlib.import_module(f"surgisim.perception.tracking.{name}").track
-
-
-def _found(rgb: np.ndarray, masks: Masks, paths: Paths, side: int, cell: float) -> list[Grip]:
-    if not masks.tool.any():
-        return []
-    moved = (paths.xy - paths.xy[:, :1]).astype(float)
-    moved = median_filter(moved, size=(1, 3, 1), mode="nearest")
-    # What lies under the instrument or off the tissue from the beginning goes with its surroundings, and may count.
-    return find(paths.xy[:, 0].astype(float), moved, contact(rgb, masks.tool, paths.xy), side, cell)
 
 
 def _choose(queries: np.ndarray, usable: np.ndarray, grips: list[Grip], settings: Tracking) -> np.ndarray:

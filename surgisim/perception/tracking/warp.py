@@ -75,7 +75,7 @@ def _advance(before: Warp, first, last, new, hidden_first, hidden_last, hidden_n
     grid = pixel_grid(*first.shape)
     guess, chained, step_error = _chain(before, last, new, hidden_last, hidden_new)
     position, anchored, anchor_error, like = _anchor(guess, first, new, hidden_first, hidden_new, before)
-    strange = np.clip(RECOGNISED - like, 0.0, 1.0)
+    strange = 1.5 * np.clip(RECOGNISED - like, 0.0, 1.0)
     error = np.where(anchored, anchor_error, np.sqrt(before.error**2 + step_error**2 + strange**2))
     seen = (anchored | chained) & _shown(position, hidden_new) & ~hidden_first & (error < LOST)
     # What is not seen goes with its surroundings; its own last motion is forgotten little by little.
