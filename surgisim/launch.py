@@ -34,7 +34,7 @@ class Job:
 
     def latest(self) -> str:
         """The last line of its log that says how far it is."""
-        return next((line for line in reversed(tail(self.log)) if line.strip()), "")
+        return next((line for line in reversed(tail(self.log)) if line.startswith(f"{self.rule} ")), "")
 
 
 @dataclass
