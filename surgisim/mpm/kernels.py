@@ -34,14 +34,38 @@ def kinematics(
     slot: int,
     p: int,
 ):
-    F = wp.identity(n=3, dtype=float)
-    Fdot = wp.mat33()
+    # Nine numbers each rather than matrices: the CPU compiler keeps those in registers.
+    f00, f01, f02 = float(1.0), float(0.0), float(0.0)
+    f10, f11, f12 = float(0.0), float(1.0), float(0.0)
+    f20, f21, f22 = float(0.0), float(0.0), float(1.0)
+    d00, d01, d02 = float(0.0), float(0.0), float(0.0)
+    d10, d11, d12 = float(0.0), float(0.0), float(0.0)
+    d20, d21, d22 = float(0.0), float(0.0), float(0.0)
     for k in range(index.shape[1]):
         i = index[p, k]
         w = link[p, k]
-        g = wp.vec3(w[1], w[2], w[3])
-        F += wp.outer(u[slot, i], g)
-        Fdot += wp.outer(v[slot, i], g)
+        a = u[slot, i]
+        b = v[slot, i]
+        f00 += a[0] * w[1]
+        f01 += a[0] * w[2]
+        f02 += a[0] * w[3]
+        f10 += a[1] * w[1]
+        f11 += a[1] * w[2]
+        f12 += a[1] * w[3]
+        f20 += a[2] * w[1]
+        f21 += a[2] * w[2]
+        f22 += a[2] * w[3]
+        d00 += b[0] * w[1]
+        d01 += b[0] * w[2]
+        d02 += b[0] * w[3]
+        d10 += b[1] * w[1]
+        d11 += b[1] * w[2]
+        d12 += b[1] * w[3]
+        d20 += b[2] * w[1]
+        d21 += b[2] * w[2]
+        d22 += b[2] * w[3]
+    F = wp.mat33(f00, f01, f02, f10, f11, f12, f20, f21, f22)
+    Fdot = wp.mat33(d00, d01, d02, d10, d11, d12, d20, d21, d22)
     return F, Fdot
 
 
