@@ -98,6 +98,9 @@ def stage(
             cli.add_argument("--code", default="", help="digest of the code, written into the headers")
             cli.add_argument("--debug", action="store_true", help="show tracebacks")
             arguments = vars(cli.parse_args())
+            # Idle threads of torch and of the compiled loops that spin on each other's cores cost several times the
+            # work itself. It has to be said before either is loaded.
+            os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
             with plain_errors(arguments["debug"] or bool(os.environ.get("SURGISIM_DEBUG"))):
                 _run(work, script.stem, reads, writes, settings, arguments)
 
