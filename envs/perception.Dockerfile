@@ -7,6 +7,7 @@ RUN pip install --no-cache-dir \
     'numpy>=2.0' \
     'onnxruntime>=1.20' \
     'opencv-python-headless>=4.10' \
+    'pillow>=10' \
     'pydantic>=2.9' \
     'pyyaml>=6' \
     'scikit-image>=0.24' \

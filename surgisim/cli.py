@@ -80,8 +80,9 @@ def demo(
     dry_run: DryRun = False,
     debug: Debug = False,
 ) -> None:
-    """Run the whole graph on the embedded clip, whose truth is known."""
-    run("phantom", out, "demo", None, None, variant, config, set_, cores, profile, until, dry_run, debug)
+    """Run the whole graph on the embedded clip, whose truth is known, with viscosity and without."""
+    variants = variant or ["main", "elastic"]
+    run("phantom", out, "demo", None, None, variants, config, set_, cores, profile, until, dry_run, debug)
 
 
 @app.command()
