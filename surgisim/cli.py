@@ -27,6 +27,9 @@ Until = Annotated[str | None, typer.Option(help="Stop after this stage.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Only say what would run.")]
 Debug = Annotated[bool, typer.Option(help="Show everything Snakemake says, and tracebacks.")]
 
+GRASP = "What the tool holds: middle and radius in the recording's first frame [px], from when to when [s]."
+CLICKS = "JSON list of points on tool or tissue: {frame, x, y, label}, at the working size [px]."
+
 
 @app.command()
 def run(
@@ -34,7 +37,8 @@ def run(
     out: Out = Path(),
     name: Annotated[str | None, typer.Option(help="What to call the clip; its file name unless said.")] = None,
     focal: Annotated[float | None, typer.Option(help="Focal length in the recording's own pixels [px].")] = None,
-    grasp: Annotated[str | None, typer.Option(metavar="X,Y", help="Where the tool grasps, in frame 0 [px].")] = None,
+    grasp: Annotated[str | None, typer.Option(metavar="X,Y,R[,START[,END]]", help=GRASP)] = None,
+    clicks: Annotated[Path | None, typer.Option(help=CLICKS)] = None,
     variant: Variants = None,
     config: Config = None,
     set_: Set = None,
@@ -47,8 +51,9 @@ def run(
     """Run the whole graph on a clip; a second run does only what changed."""
     from surgisim.order import Order, carry_out
 
-    extra = [f"ingest.focal={focal}"] if focal is not None else []
-    extra += [f"tracking.grasp={grasp}"] if grasp else []
+    extra = [f"focal={focal}"] if focal is not None else []
+    extra += [f"grasp={grasp}"] if grasp else []
+    extra += [f"clicks=@{clicks}"] if clicks else []
     with plain_errors(debug):
         title = name or re.sub(r"[^A-Za-z0-9_-]+", "_", Path(clip).name.removesuffix(Path(clip).suffix)).strip("_")
         order = Order(
@@ -82,7 +87,7 @@ def demo(
 ) -> None:
     """Run the whole graph on the embedded clip, whose truth is known, with viscosity and without."""
     variants = variant or ["main", "elastic"]
-    run("phantom", out, "demo", None, None, variants, config, set_, cores, profile, until, dry_run, debug)
+    run("phantom", out, "demo", None, None, None, variants, config, set_, cores, profile, until, dry_run, debug)
 
 
 @app.command()

@@ -15,7 +15,7 @@ EMBEDDED = "phantom"
 """A path of this name means the clip that the project invents."""
 
 SHORT = {"focal": "ingest.focal", "grasp": "tracking.grasp", "clicks": "masking.clicks"}
-"""Columns with a name of their own; any other column is called 'stage.key'."""
+"""Columns and flags with a name of their own; any other is called 'stage.key'."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,25 @@ def _clip(row: dict[str, Any], table: Path) -> Clip:
     for column, cell in row.items():
         if column in ("name", "path") or not cell.strip():
             continue
-        put(overrides, SHORT.get(column, column), value(cell, table.parent))
+        merge_entry(overrides, column, cell, table.parent, f"{table}: clip '{name}'")
     return Clip(name, None if path == EMBEDDED else (table.parent / path).resolve(), overrides)
+
+
+def merge_entry(tree: dict[str, Any], key: str, text: str, folder: Path, where: str) -> None:
+    """Write what a cell or a flag says into the nested settings; `key` is in SHORT or 'stage.key'."""
+    content = value(text, folder)
+    put(tree, SHORT.get(key, key), _grip(content, where) if key == "grasp" else content)
+
+
+def _grip(content: Any, where: str) -> list[dict[str, Any]]:
+    """'X,Y,RADIUS' with an optional START and END as the settings of one grip."""
+    if not isinstance(content, list) or not 3 <= len(content) <= 5:
+        raise Problem(
+            f"{where}: grasp is {content!r}; X,Y,RADIUS is wanted, in pixels of the recording's first frame, and "
+            "after them START,END [s] if you know them."
+        )
+    x, y, radius, *times = content
+    return [{"pixel": [x, y], "radius": radius} | dict(zip(("start", "end"), times, strict=False))]
 
 
 def put(tree: dict[str, Any], key: str, content: Any) -> None:

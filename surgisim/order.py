@@ -10,7 +10,7 @@ import yaml
 from rich.console import Console
 from rich.markup import escape
 
-from surgisim.clips import EMBEDDED, put, value
+from surgisim.clips import EMBEDDED, merge_entry
 from surgisim.config.base import parse
 from surgisim.config.whole import PARENTS, Whole, rooted
 from surgisim.follow import follower
@@ -86,7 +86,7 @@ def chosen(configs: tuple[Path, ...], settings: tuple[str, ...]) -> dict[str, An
         if not equals:
             raise Problem(f"--set {entry}: STAGE.KEY=VALUE is wanted, for example ingest.size=160.")
         one: dict[str, Any] = {}
-        put(one, key.strip(), value(text, Path.cwd()))
+        merge_entry(one, key.strip(), text, Path.cwd(), f"--set {entry}")
         parse(Whole, one, f"--set {entry}")
         total = merged(total, rooted(one, Path.cwd()))
     return total

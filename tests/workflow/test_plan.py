@@ -97,6 +97,13 @@ def test_a_cell_may_name_a_file_with_the_value(tables, tmp_path):
     assert json.loads(todo.slices["masking", "a", "main"])["clicks"][0]["x"] == 3
 
 
+def test_a_grip_is_given_by_its_middle_radius_and_times(tables):
+    todo = tables(clips="name\tpath\tgrasp\na\tphantom\t31,20,6,0.5\n")
+    grip = json.loads(todo.slices["tracking", "a", "main"])["grasp"][0]
+    assert grip == {"pixel": [31.0, 20.0], "radius": 6.0, "start": 0.5, "end": None}
+    assert "X,Y,RADIUS is wanted" in says(tables, clips="name\tpath\tgrasp\na\tphantom\t31,20\n")
+
+
 def test_a_stage_sees_its_own_settings_only(tables):
     slices = tables().slices
     assert "iterations" in json.loads(slices["reconstruction", "demo", "main"])
