@@ -107,10 +107,12 @@ def _aligned(found: np.ndarray, usable: np.ndarray) -> np.ndarray:
             out.append(found[t])
             continue
         have, want = found[t][both], found[0][both]
-        weight = np.ones_like(have)
-        for _ in range(10):
-            slope, offset = np.polyfit(have, want, 1, w=np.sqrt(weight))
+        quartiles = np.percentile([have, want], [25, 50, 75], axis=1)
+        slope = (quartiles[2, 1] - quartiles[0, 1]) / max(quartiles[2, 0] - quartiles[0, 0], 1e-9)
+        offset = quartiles[1, 1] - slope * quartiles[1, 0]
+        for _ in range(20):
             rest = np.abs(slope * have + offset - want)
             weight = 1 / (1 + (rest / (np.median(rest) + 1e-9)) ** 2)
+            slope, offset = np.polyfit(have, want, 1, w=weight)
         out.append(slope * found[t] + offset if slope > 0 else found[t])
     return np.stack(out)

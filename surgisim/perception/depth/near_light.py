@@ -72,9 +72,12 @@ def estimate(
     rest = _first(lattice, light, hue, known, relief)
     rest += np.log(distance) - np.median(rest[known > 0.5] if (known > 0.5).any() else rest)
     albedo = light + shading(lattice, rest)
-    looks, origin = [], lattice.pixels
+    looks, origin, alone = [], lattice.pixels, rest - np.median(rest)
     for t, warp in enumerate(follow_surface(rgb, hidden)):
-        look, origin = _look(lattice, warp, rgb[t], hidden[t] | specular[t], rest, albedo, origin, ratio * camera.fx)
+        now = _read(rgb[t], hidden[t] | specular[t], lattice.shape)
+        alone = _first(lattice, *now, relief, begin=alone, turns=1) if t else alone
+        scale = np.array(lattice.shape[::-1]) / np.array(rgb.shape[2:0:-1])
+        look, origin = _look(lattice, warp, now, alone, rest, albedo, origin, scale, ratio * camera.fx)
         looks.append(look)
         if progress:
             progress(t + 1, 2 * len(rgb), "light along the tissue's way")
@@ -100,15 +103,15 @@ def estimate(
     return np.stack(z).astype(np.float32), np.stack(confidence).astype(np.float32)
 
 
-def _look(lattice, warp, rgb, covered, rest, albedo, origin, focal) -> tuple[_Look, np.ndarray]:
+def _look(lattice, warp, now, alone, rest, albedo, origin, scale, focal) -> tuple[_Look, np.ndarray]:
+    light, _, known = now
     sure = _shrink(warp.seen * np.exp(-((warp.error / 0.8) ** 2)), lattice.shape)
-    scale = np.array(lattice.shape[::-1]) / np.array(rgb.shape[1::-1])
     position = (_shrink(warp.position, lattice.shape) + 0.5) * scale - 0.5
     origin, weight = _inverse(position, sure, origin, lattice)
-    start = spread(_at(rest, origin), weight)
+    # Tissue that frame 0 did not show has the shape that this frame alone suggests, fitted to what is known around it.
+    start = alone + spread(_at(rest, origin) - alone, weight)
     moved = spread(np.linalg.norm(origin - lattice.pixels, axis=-1), weight) / focal
     moved = cv2.GaussianBlur(moved.astype(np.float32), (0, 0), 1.5).astype(float)
-    light, _, known = _read(rgb, covered, lattice.shape)
     weight = weight * known
     excess = light - _at(albedo, origin)
     still = (weight > 0.5) & (moved < 0.5 / focal)
@@ -132,13 +135,22 @@ def _read(rgb: np.ndarray, covered: np.ndarray, shape: tuple[int, int]):
     return np.log(mean.mean(-1)).astype(float), hue.astype(float), share.astype(float)
 
 
-def _first(lattice: Lattice, light: np.ndarray, hue: np.ndarray, known: np.ndarray, relief: float) -> np.ndarray:
-    """Log depth of frame 0, about 0: shape and hue's share of the albedo in turns."""
-    log_z, use = np.zeros_like(light), known > 0.5
+def _first(
+    lattice: Lattice,
+    light: np.ndarray,
+    hue: np.ndarray,
+    known: np.ndarray,
+    relief: float,
+    *,
+    begin: np.ndarray | None = None,
+    turns: int = 6,
+) -> np.ndarray:
+    """Log depth of one frame by itself, about 0: shape and hue's share of the albedo in turns."""
+    log_z, use = np.zeros_like(light) if begin is None else begin, known > 0.5
     if use.sum() < 16:
         return log_z
     features = hue - np.median(hue[use], axis=0)
-    for _ in range(6):
+    for _ in range(turns):
         rho = light + shading(lattice, log_z)
         tilt = features[use].T @ features[use] / use.sum() + (ALBEDO / HUE) ** 2 / 50 * np.eye(2)
         weights = np.linalg.solve(tilt, features[use].T @ (rho[use] - np.median(rho[use])) / use.sum())

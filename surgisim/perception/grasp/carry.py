@@ -9,7 +9,7 @@ from surgisim.artifacts.motion import Motion
 from surgisim.perception.grasp.contact import Contact
 from surgisim.perception.grasp.find import SHOWN, Grip
 from surgisim.perception.tracking import Paths
-from surgisim.perception.tracking.refine import sample
+from surgisim.perception.tracking.between import sample
 
 
 def carry(

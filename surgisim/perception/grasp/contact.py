@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from surgisim.perception.flow import dense_flow
-from surgisim.perception.tracking.refine import sample
+from surgisim.perception.tracking.between import sample
 
 
 @dataclass(frozen=True)

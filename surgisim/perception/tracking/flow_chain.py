@@ -12,7 +12,8 @@ import numpy as np
 
 from surgisim.config.tracking import Tracking
 from surgisim.perception.tracking import Paths
-from surgisim.perception.tracking.refine import Templates, find, sample, templates
+from surgisim.perception.tracking.between import sample
+from surgisim.perception.tracking.refine import Templates, find, templates
 from surgisim.perception.tracking.warp import Warp, follow_surface
 
 LIKE, STRANGE = 0.7, 0.2

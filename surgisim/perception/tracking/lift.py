@@ -6,7 +6,7 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.tracks import Tracks
 from surgisim.perception.tracking import Paths
-from surgisim.perception.tracking.refine import sample
+from surgisim.perception.tracking.between import sample
 
 FINE, COARSE = 0.004, 0.04
 """Standard deviation of depth's change, as a share of it, where confidence is 1 and where it is 0."""

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-STEPS = 6
+from surgisim.perception.tracking.between import sample
+
+STEPS = 4
 
 
 @dataclass(frozen=True)
@@ -66,23 +68,12 @@ def find(patches: Templates, grey: np.ndarray, position: np.ndarray, hidden: np.
         at = _where(patches, position, shift)
         weight = patches.weight * (sample(covered, at) < 0.01)
         now, gain = _match_light(patches.value, sample(grey, at), weight)
-        step, spread_ = _solve(patches.slope, now - patches.value, weight)
+        step, spread_ = _solve(_unlit(patches.slope, patches.value, weight), now - patches.value, weight)
         shift = shift - step
         shift *= np.minimum(1.0, 4.0 / np.maximum(np.linalg.norm(shift, axis=-1, keepdims=True), 1e-9))
     enough = weight.sum(-1) > 0.4 * np.maximum(patches.weight.sum(-1), 1e-9)
     settled = enough & (np.linalg.norm(step, axis=-1) < 0.2) & (gain > 0)
     return Found(shift, np.where(settled, spread_, np.inf), _correlation(patches.value, now, weight))
-
-
-def sample(image: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """`image` (H, W) or (H, W, C) float32 read between pixels at `at` (..., 2) [px], edge values repeated."""
-    flat = at.reshape(-1, at.shape[-2], 2).astype(np.float32)
-    way = cv2.INTER_LINEAR if image.ndim == 3 else cv2.INTER_CUBIC
-    parts = [
-        cv2.remap(image, part[..., 0], part[..., 1], way, borderMode=cv2.BORDER_REPLICATE)
-        for part in np.array_split(flat, max(1, -(-len(flat) // 16000)))
-    ]
-    return np.concatenate(parts).reshape(*at.shape[:-1], *image.shape[2:])
 
 
 def _where(patches: Templates, position: np.ndarray, shift: np.ndarray) -> np.ndarray:
@@ -97,6 +88,15 @@ def _match_light(want: np.ndarray, have: np.ndarray, weight: np.ndarray) -> tupl
     return want - a + gain * b, gain[:, 0]
 
 
+def _unlit(slope: np.ndarray, value: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """The part of `slope` (K, N, 2) that no gain or offset of the brightness can mimic."""
+    total = weight.sum(-1, keepdims=True) + 1e-6
+    a = value - (weight * value).sum(-1, keepdims=True) / total
+    free = slope - (np.einsum("kn,kni->ki", weight, slope) / total)[:, None]
+    share = np.einsum("kn,kni->ki", weight * a, free) / ((weight * a * a).sum(-1) + 1e-6)[:, None]
+    return free - a[..., None] * share[:, None]
+
+
 def _solve(slope: np.ndarray, rest: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Least-squares shift (K, 2) that explains `rest`, and its standard deviation (K,)."""
     pull = np.einsum("kn,kni,knj->kij", weight, slope, slope) + 1e-3 * np.eye(2)
@@ -104,8 +104,7 @@ def _solve(slope: np.ndarray, rest: np.ndarray, weight: np.ndarray) -> tuple[np.
     inverse = np.linalg.inv(pull)
     noise = (weight * rest**2).sum(-1) / (weight.sum(-1) + 1e-6)
     worst = np.linalg.eigvalsh(inverse)[:, 1]
-    # Neighbouring pixels' errors go together: about four of them count as one.
-    return np.einsum("kij,kj->ki", inverse, push), 2.0 * np.sqrt(noise * worst)
+    return np.einsum("kij,kj->ki", inverse, push), np.sqrt(noise * worst)
 
 
 def _correlation(want: np.ndarray, have: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -1,0 +1,131 @@
+import numpy as np
+import pytest
+from pulled_sheet import camera, pull_sheet
+
+from surgisim.artifacts.given import Given
+from surgisim.artifacts.inpainted import COPIED, SEEN, Inpainted
+from surgisim.artifacts.masks import Masks
+from surgisim.config.depth import Depth as Settings
+from surgisim.perception.depth import near_light, shading
+from surgisim.perception.depth.complete import complete
+from surgisim.perception.depth.distance import depth
+from surgisim.perception.tracking.between import sample
+from surgisim.problem import Problem
+
+NONE = np.zeros((0, 48, 64), np.float32)
+
+
+def test_a_plane_that_faces_the_lamp_is_as_bright_as_cos_over_distance_squared():
+    cam = camera(64, 48, 1)
+    lattice = shading.Lattice.of(cam, 1.0)
+    away = np.sqrt((lattice.ray**2).sum(-1) + 1)
+    dark = shading.shading(lattice, np.full(lattice.shape, np.log(0.07)))
+    assert np.allclose(np.exp(-dark), (1 / away) / (0.07 * away) ** 2)
+
+
+def test_the_shading_of_a_tilted_plane_is_that_of_its_normal():
+    cam = camera(64, 48, 1)
+    lattice = shading.Lattice.of(cam, 1.0)
+    normal = np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
+    ray = np.concatenate([lattice.ray, np.ones((*lattice.shape, 1))], -1)
+    z = 0.07 / (ray @ normal)
+    away = np.linalg.norm(ray * z[..., None], axis=-1)
+    bright = (ray @ normal) / np.linalg.norm(ray, axis=-1) / away**2
+    inner = (slice(2, -2), slice(2, -2))
+    assert np.allclose(shading.shading(lattice, np.log(z))[inner], -np.log(bright)[inner], atol=2e-3)
+
+
+def test_the_depth_that_explains_a_shading_is_the_one_that_made_it():
+    lattice = shading.Lattice.of(camera(40, 32, 1), 1.0)
+    x, y = lattice.ray[..., 0], lattice.ray[..., 1]
+    true = 0.1 * x - 0.2 * y - 0.05 * np.exp(-(x**2 + y**2) / 0.04)
+    light = -shading.shading(lattice, true)
+    found, rest = shading.explain(
+        lattice, light, np.ones_like(light), 0 * light, spread_of_data=0.01, spread_of_shape=1.0, finest=0.1
+    )
+    assert np.abs(found - true).max() < 0.01
+    assert np.abs(rest).max() < 0.02
+
+
+def test_a_tilted_sheet_of_any_paint_is_found_tilted():
+    sheet = pull_sheet(frames=2)
+    z, _ = near_light.estimate(sheet.rgb, sheet.tool, np.zeros_like(sheet.tool), sheet.camera)
+    slope = np.polyfit(sheet.depth[0].ravel(), z[0].ravel() * 0.07 / np.median(z[0]), 1)[0]
+    assert np.corrcoef(z[0].ravel(), sheet.depth[0].ravel())[0, 1] > 0.8
+    assert 0.4 < slope < 1.3
+
+
+@pytest.mark.parametrize("pull", [(0.006, -0.004, -0.004), (-0.006, -0.004, 0.0)])
+def test_tissue_that_comes_nearer_is_told_from_tissue_that_only_slides(pull):
+    sheet = pull_sheet(pull=pull, frames=14, begin=2, release=9)
+    z, _ = near_light.estimate(sheet.rgb, sheet.tool, np.zeros_like(sheet.tool), sheet.camera)
+    moved = np.linalg.norm(sheet.xyz[8] - sheet.xyz[0], axis=-1) > 1e-3
+    change = (sample(z[8], sheet.position[8]) - z[0])[moved]
+    true = (sheet.xyz[8] - sheet.xyz[0])[..., 2][moved]
+    assert np.sqrt(((change - true) ** 2).mean()) < 0.0007
+    back = (sample(z[-1], sheet.position[-1]) - z[0])[moved]
+    assert np.abs(back).mean() < 0.0004
+
+
+def test_holes_and_frames_without_any_depth_are_bridged():
+    z = np.full((5, 48, 64), 0.06, np.float32)
+    z += np.linspace(0, 0.01, 64, dtype=np.float32) + 0.001 * np.arange(5)[:, None, None].astype(np.float32)
+    true, known = z.copy(), np.ones(z.shape, bool)
+    known[2] = False
+    known[:, 20:26, 30:40] = False
+    whole, trust = complete(np.where(known, z, 0.0), known, np.ones(z.shape, bool))
+    assert np.abs(whole - true).max() < 0.0015
+    assert trust[1, 10, 10] > trust[2, 10, 10] > 0
+    assert trust[1, 22, 35] < 0.5 * trust[1, 10, 10]
+
+
+def test_given_depth_keeps_its_scale_through_millimetre_steps():
+    true = 0.05 + 0.01 * np.linspace(0, 1, 64, dtype=np.float32) * np.ones((5, 48, 1), np.float32)
+    given = Given(np.zeros((0, 48, 64), bool), np.round(true, 3), np.zeros((0, 48, 64, 3), np.uint8), 0.0)
+    result = depth(*_clip(5), given, camera(64, 48, 5), Settings())
+    assert result.scale == "known"
+    assert np.sqrt(((result.z - true) ** 2).mean()) < 0.00025
+
+
+@pytest.mark.parametrize(("baseline", "scale"), [(0.004, "known"), (0.0, "arbitrary")])
+def test_a_right_view_gives_depth_and_a_baseline_its_scale(baseline, scale):
+    cam = camera(64, 48, 2)
+    rng = np.random.default_rng(1)
+    left = np.repeat(rng.integers(0, 255, (1, 48, 64, 3), dtype=np.uint8), 2, 0)
+    right = np.roll(left, -6, axis=2)
+    masks, inpainted = _clip(2)[1], Inpainted(left, np.zeros(left.shape[:3], np.uint8))
+    given = Given(np.zeros((0, 48, 64), bool), NONE, right, baseline)
+    result = depth(inpainted, masks, given, cam, Settings(distance=0.09))
+    assert result.scale == scale
+    want = cam.fx * baseline / 6 if baseline else 0.09
+    assert np.allclose(np.median(result.z), want, rtol=0.01)
+
+
+def test_what_was_not_seen_is_hardly_trusted():
+    inpainted, masks = _clip(5)
+    origin = np.where(np.arange(64) < 20, COPIED, SEEN) * np.ones((5, 48, 1), int)
+    given = Given(np.zeros((0, 48, 64), bool), NONE, np.zeros((0, 48, 64, 3), np.uint8), 0.0)
+    result = depth(Inpainted(inpainted.rgb, origin.astype(np.uint8)), masks, given, camera(64, 48, 5), Settings())
+    assert result.confidence[:, :, :20].max() <= 0.1 < result.confidence[:, :, 25:].mean()
+
+
+def test_a_black_recording_still_has_a_depth():
+    masks = _clip(3)[1]
+    black = Inpainted(np.zeros((3, 48, 64, 3), np.uint8), np.zeros((3, 48, 64), np.uint8))
+    given = Given(np.zeros((0, 48, 64), bool), NONE, np.zeros((0, 48, 64, 3), np.uint8), 0.0)
+    assert np.allclose(depth(black, masks, given, camera(64, 48, 3), Settings()).z, 0.07)
+
+
+@pytest.mark.parametrize(("backend", "word"), [("given", "given"), ("stereo", "right"), ("depth_anything", "weights")])
+def test_a_backend_without_its_input_says_what_it_wants(backend, word):
+    given = Given(np.zeros((0, 48, 64), bool), NONE, np.zeros((0, 48, 64, 3), np.uint8), 0.0)
+    with pytest.raises(Problem, match=word) as problem:
+        depth(*_clip(2), given, camera(64, 48, 2), Settings(backend=backend))
+    assert "near_light" in str(problem.value)
+
+
+def _clip(frames: int) -> tuple[Inpainted, Masks]:
+    sheet = pull_sheet(frames=frames, size=(64, 48))
+    none = np.zeros_like(sheet.tool)
+    masks = Masks(none, ~none, none, np.ones(frames, np.float32))
+    return Inpainted(sheet.rgb, np.zeros(none.shape, np.uint8)), masks
