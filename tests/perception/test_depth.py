@@ -129,3 +129,13 @@ def _clip(frames: int) -> tuple[Inpainted, Masks]:
     none = np.zeros_like(sheet.tool)
     masks = Masks(none, ~none, none, np.ones(frames, np.float32))
     return Inpainted(sheet.rgb, np.zeros(none.shape, np.uint8)), masks
+
+
+def test_a_frame_in_which_nothing_is_recognised_keeps_the_distance():
+    inpainted, masks = _clip(4)
+    tool = np.zeros_like(masks.tool)
+    tool[2:] = True
+    masks = Masks(tool, ~tool, np.zeros_like(tool), np.ones(4, np.float32))
+    given = Given(np.zeros((0, 48, 64), bool), NONE, np.zeros((0, 48, 64, 3), np.uint8), 0.0)
+    result = depth(inpainted, masks, given, camera(64, 48, 4), Settings())
+    assert np.abs(np.log(result.z / 0.07)).max() < 0.4

@@ -109,7 +109,8 @@ def _look(lattice, warp, now, alone, rest, albedo, origin, scale, focal) -> tupl
     position = (_shrink(warp.position, lattice.shape) + 0.5) * scale - 0.5
     origin, weight = _inverse(position, sure, origin, lattice)
     # Tissue that frame 0 did not show has the shape that this frame alone suggests, fitted to what is known around it.
-    start = alone + spread(_at(rest, origin) - alone, weight)
+    surely = weight.max() > 0.1
+    start = alone + (spread(_at(rest, origin) - alone, weight) if surely else np.median(rest) - np.median(alone))
     moved = spread(np.linalg.norm(origin - lattice.pixels, axis=-1), weight) / focal
     moved = cv2.GaussianBlur(moved.astype(np.float32), (0, 0), 1.5).astype(float)
     weight = weight * known
