@@ -29,7 +29,7 @@ def dense_flow(a: np.ndarray, b: np.ndarray, *, start: np.ndarray | None = None)
 
 def carry(field: np.ndarray, flow: np.ndarray, *, nearest: bool = False) -> np.ndarray:
     """`field` read where `flow` points: out(x) = field(x + flow(x)), edge values repeated, (H, W, ...)."""
-    xy = pixel_grid(*flow.shape[:2]) + flow
+    xy = (pixel_grid(*flow.shape[:2]) + flow).astype(np.float32)
     way = cv2.INTER_NEAREST if nearest else cv2.INTER_LINEAR
     return cv2.remap(field, xy[..., 0], xy[..., 1], way, borderMode=cv2.BORDER_REPLICATE)
 
