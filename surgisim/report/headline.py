@@ -31,7 +31,7 @@ def shown(value: float) -> str:
         return f"{value:.1e}"
     if size >= 1:
         return f"{value:,.{max(0, 3 - len(str(int(size))))}f}"
-    return f"{value:.3f}" if size >= 0.1 else f"{value:.2g}"
+    return f"{value:.3f}" if size >= 0.1 else f"{value:#.2g}"
 
 
 def _card(story: Story, title: str, group: str, name: str, beside: str = "", mark: str = "plain") -> Card | None:

@@ -182,7 +182,7 @@ def _bodies(world: World, picture: np.ndarray) -> tuple[Body, Scene, Material]:
     scene = Scene(top.astype(np.float32), np.full(g, 3, np.float32), scale, turn, color)
     stiff = 3000 * (1 + 0.5 * np.tanh(rest[:, 0] / 0.01))
     names = np.array(["corotated.E", "newtonian.eta"])
-    return body, scene, Material(names, np.stack([stiff, np.full(count, 12.0)], -1).astype(np.float32))
+    return body, scene, Material(names, np.stack([stiff, np.full(count, 12.0)], -1).astype(np.float32), body.held)
 
 
 def _tracks(world: World, tool: np.ndarray, depth: np.ndarray) -> tuple[Tracks, Truth]:

@@ -46,8 +46,11 @@ def particles(
         if bar:
             from matplotlib.cm import ScalarMappable
             from matplotlib.colors import Normalize
+            from matplotlib.ticker import MaxNLocator
 
             name, least, most, label = bar
             scale = ScalarMappable(Normalize(least, most), name)
-            figure.colorbar(scale, ax=axes, orientation="horizontal", label=label, aspect=40, pad=0.02)
+            figure.colorbar(
+                scale, ax=axes, orientation="horizontal", label=label, aspect=40, pad=0.02
+            ).locator = MaxNLocator(5)
         return photograph(figure)
