@@ -1,6 +1,5 @@
 """The command `surgisim`: run the graph on a clip, and say what this machine and this project have."""
 
-import re
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +15,9 @@ app = typer.Typer(
 )
 
 Out = Annotated[Path, typer.Option(help="Folder for results/, logs/ and benchmarks/.")]
-Variants = Annotated[list[str] | None, typer.Option("--variant", help="Variant to run; repeat it, or say 'all'.")]
+Operation = Annotated[Path | None, typer.Option(help="A new operation as JSON (docs/operations.md), run as a variant.")]
+Variant = Annotated[list[str] | None, typer.Option(help="Variant to run; repeat it, or say 'all'.")]
+Variants = Annotated[Path | None, typer.Option(help="A variants.yaml of your own.")]
 Config = Annotated[
     list[Path] | None, typer.Option(help="YAML file of the keys of config.yaml that differ; repeatable.")
 ]
@@ -39,7 +40,9 @@ def run(
     focal: Annotated[float | None, typer.Option(help="Focal length in the recording's own pixels [px].")] = None,
     grasp: Annotated[str | None, typer.Option(metavar="X,Y,R[,START[,END]]", help=GRASP)] = None,
     clicks: Annotated[Path | None, typer.Option(help=CLICKS)] = None,
-    variant: Variants = None,
+    operation: Operation = None,
+    variant: Variant = None,
+    variants: Variants = None,
     config: Config = None,
     set_: Set = None,
     cores: Cores = "all",
@@ -49,18 +52,19 @@ def run(
     debug: Debug = False,
 ) -> None:
     """Run the whole graph on a clip; a second run does only what changed."""
-    from surgisim.order import Order, carry_out
+    from surgisim.order import Order, called, carry_out
 
     extra = [f"focal={focal}"] if focal is not None else []
     extra += [f"grasp={grasp}"] if grasp else []
     extra += [f"clicks=@{clicks}"] if clicks else []
     with plain_errors(debug):
-        title = name or re.sub(r"[^A-Za-z0-9_-]+", "_", Path(clip).name.removesuffix(Path(clip).suffix)).strip("_")
         order = Order(
             clip=clip,
-            name=title or "clip",
+            name=name or called(Path(clip)),
             out=out,
             variants=tuple(variant or ()),
+            book=variants,
+            operation=operation,
             configs=tuple(config or ()),
             settings=(*(set_ or ()), *extra),
             cores=cores,
@@ -76,7 +80,9 @@ def run(
 @app.command()
 def demo(
     out: Out = Path(),
-    variant: Variants = None,
+    operation: Operation = None,
+    variant: Variant = None,
+    variants: Variants = None,
     config: Config = None,
     set_: Set = None,
     cores: Cores = "all",
@@ -86,8 +92,21 @@ def demo(
     debug: Debug = False,
 ) -> None:
     """Run the whole graph on the embedded clip, whose truth is known, with viscosity and without."""
-    variants = variant or ["main", "elastic"]
-    run("phantom", out, "demo", None, None, None, variants, config, set_, cores, profile, until, dry_run, debug)
+    run(
+        clip="phantom",
+        name="demo",
+        out=out,
+        operation=operation,
+        variant=variant or ["main", "elastic"],
+        variants=variants,
+        config=config,
+        set_=set_,
+        cores=cores,
+        profile=profile,
+        until=until,
+        dry_run=dry_run,
+        debug=debug,
+    )
 
 
 @app.command()

@@ -1,6 +1,7 @@
 """What the user asked for, written down beside the results, run, and answered."""
 
 import difflib
+import re
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ import yaml
 from rich.console import Console
 from rich.markup import escape
 
-from surgisim.clips import EMBEDDED, merge_entry
+from surgisim.clips import EMBEDDED, merge_entry, value
 from surgisim.config.base import parse
 from surgisim.config.whole import PARENTS, Whole, rooted
 from surgisim.follow import follower
@@ -26,6 +27,10 @@ class Order:
     name: str
     out: Path
     variants: tuple[str, ...]
+    book: Path | None
+    """A variants.yaml of the user's own."""
+    operation: Path | None
+    """A new operation, run as a variant named after its file."""
     configs: tuple[Path, ...]
     settings: tuple[str, ...]
     """'stage.key=value' entries; they win over `configs`."""
@@ -41,14 +46,19 @@ def carry_out(order: Order) -> int:
     console = Console(highlight=False, soft_wrap=True)
     place, out = home(), order.out.resolve()
     choices = chosen(order.configs, order.settings)
-    variants = place / "config" / "variants.yaml"
-    known = tuple(read_variants(variants))
+    base = yaml.safe_load((place / "config" / "config.yaml").read_text())
+    known = read_variants(order.book or place / "config" / "variants.yaml")
     if order.variants:
         choices["run"] = list(known if "all" in order.variants else order.variants)
+    if order.operation:
+        title = called(order.operation)
+        known[title] = {"simulation": {"operation": value(f"@{order.operation}", Path.cwd())}}
+        choices["run"] = [*choices.get("run", base["run"]), title]
+    variants = out / "results" / "variants.yaml"
+    _write(variants, yaml.safe_dump(known, sort_keys=False))
     table = Path(order.clip).resolve() if order.clip.endswith(".tsv") else out / "results" / "clips.tsv"
     if not order.clip.endswith(".tsv"):
         _write(table, f"name\tpath\n{order.name}\t{_recording(order.clip)}\n")
-    base = yaml.safe_load((place / "config" / "config.yaml").read_text())
     todo = plan(merged(base, choices), clips=table, variants=variants)
     _look_for(todo, table)
     written = out / "results" / "run.yaml"
@@ -65,6 +75,11 @@ def carry_out(order: Order) -> int:
         _announce(console, state)
         return code
     return _answer(console, todo, out, code, state, order, time.monotonic() - began)
+
+
+def called(path: Path) -> str:
+    """A file's name as the name of a clip or a variant."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "_", path.name.removesuffix(path.suffix)).strip("_-") or "unnamed"
 
 
 def chosen(configs: tuple[Path, ...], settings: tuple[str, ...]) -> dict[str, Any]:

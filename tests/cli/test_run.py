@@ -87,6 +87,13 @@ def test_settings_by_file_and_by_flag_reach_the_stages(tree):
     assert "tail: 0.3" in written
 
 
+def test_a_new_operation_is_a_variant_that_shares_everything_before_the_simulation(tree):
+    (tree.root / "pull more.json").write_text('{"name": "more", "seconds": 1.0, "do": []}')
+    done = tree.surgisim("demo", "--out", "there", "--variant", "main", "--operation", "pull more.json", "-n")
+    started = [line for line in done.stdout.splitlines() if "pull_more" in line]
+    assert sorted(started) == [f"would run {stage} demo/pull_more" for stage in ("evaluation", "report", "simulation")]
+
+
 def test_a_package_without_its_checkout_says_what_to_do(tree, tmp_path, monkeypatch):
     monkeypatch.setenv("SURGISIM_HOME", str(tmp_path / "empty"))
     assert "Install from a checkout" in sentence(tree.surgisim("demo", "--out", "there"))
