@@ -18,6 +18,8 @@ class Estimation(Settings):
     """Law -> parameter -> value a fit starts from, instead of the law's default [the parameter's unit]."""
     fixed: list[str] = []
     """'law.parameter' entries that keep their start value [-]."""
+    support: bool = True
+    """Whether to choose how deep and where the body is held by what fits the pull best [-]."""
     density: float = Field(1050.0, gt=0)
     """Mass density of the tissue [kg/m^3]."""
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)

@@ -77,8 +77,9 @@ def in_words(table: dict, steps: int, before: float, after: float) -> str:
     told = [n for n, q in table.items() if q["told"]]
     untold = [n for n, q in table.items() if not q["told"]]
     parts = [
-        f"On frames that were never fitted, the median distance between simulated and tracked points is "
-        f"{after * 1e3:.3f} mm ({before * 1e3:.3f} mm with default parameters), with {steps} steps a frame."
+        f"On frames that were never fitted, simulated and tracked points of the moving tissue are "
+        f"{after * 1e3:.3f} mm apart on average ({before * 1e3:.3f} mm with default parameters), "
+        f"with {steps} steps a frame."
     ]
     if told:
         parts.append("The clip tells " + ", ".join(_quoted(n, table[n]) for n in told) + ".")

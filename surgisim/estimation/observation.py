@@ -32,14 +32,24 @@ class Observation:
         simulated = np.stack([self.carry @ u[t].astype(float) for t in frames], 1)
         return self.weight[:, frames] * (simulated - self.displacement[:, frames])
 
+    @property
+    def moving(self) -> np.ndarray:
+        """Points that go at least a tenth as far as the one that goes farthest, (K,) bool.
+
+        Where the tissue stays still every simulation is right, and a median over the whole surface
+        cannot tell a good one from a bad one.
+        """
+        farthest = np.linalg.norm(self.displacement, axis=-1).max(1)
+        return farthest > 0.1 * np.percentile(farthest, 99)
+
     def error(self, u: np.ndarray, frames: np.ndarray) -> float:
-        """Median distance between simulated and seen points at `frames` [m]; NaN if none is seen."""
+        """Mean distance between simulated and seen points that move, at `frames` [m]; NaN if none is seen."""
         if not len(frames):
             return float("nan")
         simulated = np.stack([self.carry @ u[t].astype(float) for t in frames], 1)
-        seen = self.weight[:, frames].any(-1)
+        seen = self.weight[:, frames].any(-1) & self.moving[:, None]
         distance = np.linalg.norm(simulated - self.displacement[:, frames], axis=-1)[seen]
-        return float(np.median(distance)) if len(distance) else float("nan")
+        return float(np.mean(distance)) if len(distance) else float("nan")
 
 
 def observe(tracks: Tracks, motion: Motion, simulator: Simulator, *, floor: float) -> Observation:

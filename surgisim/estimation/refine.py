@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from surgisim.estimation.gauss_newton import WIDTH, misfit
 from surgisim.estimation.observation import Observation
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.simulator import Breakdown, Simulator
@@ -99,13 +100,12 @@ def refine(
     return Refined(final, bool(kept), history)
 
 
-def _track_loss(observation: Observation, u: np.ndarray, frames: np.ndarray, width: float = 2.0):
+def _track_loss(observation: Observation, u: np.ndarray, frames: np.ndarray):
     """Mean Huber misfit of the tracks at `frames` and its derivative by u, (T, A, 3)."""
     r = observation.residual(u, frames)
     count = max(1, int((observation.weight[:, frames] > 0).sum()))
-    a = np.abs(r)
-    loss = float(np.where(a <= width, a**2, 2 * width * a - width**2).sum() / count)
-    slope = 2 * r / np.maximum(1.0, a / width) * observation.weight[:, frames] / count
+    loss = misfit(r) / count
+    slope = 2 * r / np.maximum(1.0, np.abs(r) / WIDTH) * observation.weight[:, frames] / count
     u_bar = np.zeros(u.shape)
     for n, t in enumerate(frames):
         u_bar[t] = observation.carry.T @ slope[:, n]

@@ -13,9 +13,11 @@ from surgisim.artifacts.masks import Masks
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
-from surgisim.estimation.fit import _windows, estimate
+from surgisim.estimation.fit import estimate
 from surgisim.estimation.observation import PHASES, phases
+from surgisim.estimation.rounds import windows
 from surgisim.estimation.search import search
+from surgisim.estimation.support import supports
 from surgisim.mpm.setup import prepare
 from surgisim.problem import Problem
 
@@ -29,7 +31,7 @@ def silent(*_):
     pass
 
 
-def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, seed=0):
+def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, held=None, seed=0):
     """What the stages before would hand over, made with `values` and then forgotten."""
     body, motion = slab(), motion or pulled(frames=T, hold=9)
     made = prepare(body, tuple(values), density=1050.0)
@@ -39,7 +41,7 @@ def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, seed=0):
     per_frame = 2 * made.per_frame(
         {**values, "corotated": {"E": theta[:, 0].max(), "nu": values["corotated"]["nu"]}}, FPS
     )
-    run = made.simulator.run(theta, made.drive(motion, values, fps=FPS, per_frame=per_frame))
+    run = made.simulator.run(theta, made.drive(motion, values, fps=FPS, per_frame=per_frame, held=held))
     points = body.rest[body.surface].astype(float)
     rng = np.random.default_rng(seed)
     carry = made.simulator.carry(points)
@@ -121,11 +123,18 @@ def test_a_stiff_half_is_found_by_the_refinement():
 
 def test_rounds_double_so_that_their_sum_stays_below_twice_the_clip():
     for frames in (24, 100, 400):
-        motion = pulled(frames=frames, hold=9)
-        windows = _windows(motion, np.arange(1, frames), 0.25)
-        assert windows[-1] == frames - 1
-        assert sum(windows) <= 2 * frames
-        assert all(b > a for a, b in itertools.pairwise(windows))
+        ends = windows(np.arange(1, frames), phases(pulled(frames=frames, hold=9), frames), 0.1)
+        assert ends[-1] == frames - 1
+        assert sum(ends) <= 2 * frames
+        assert all(b > a for a, b in itertools.pairwise(ends))
+        assert ends[0] >= 14
+
+
+def test_what_holds_the_body_is_chosen_by_the_spread_of_the_pull():
+    choices = supports(slab(), CAMERA)
+    shallow = next(c for c in choices if c.depth < 0.5 * choices[0].depth)
+    _, _, fit = estimate(*clip(held=shallow.held), Estimation(**QUICK), silent)
+    assert fit.held_out["support"]["depth"] == pytest.approx(shallow.depth)
 
 
 def test_phases_follow_the_grip():

@@ -30,7 +30,7 @@ def fitted(body, step=None):
     terms = {law: {p: {"value": v, "unit": UNITS[p]} for p, v in ps.items()} for law, ps in VALUES.items()}
     physics = Physics(terms, 1050.0, [0.0, 0.0, 0.0], {"spacing": body.spacing, "step": step})
     names = np.array(["corotated.E", "corotated.nu", "newtonian.eta"])
-    return Material(names, np.tile([1500.0, 0.42, 2.0], (len(body.rest), 1)).astype(np.float32)), physics
+    return Material(names, np.tile([1500.0, 0.42, 2.0], (len(body.rest), 1)).astype(np.float32), body.held), physics
 
 
 def splats(body):

@@ -56,6 +56,6 @@ TERM = Term(
     wave_modulus=wave_modulus,
     params={
         "E": Param("Pa", low=1e2, high=1e6, default=3e3, off=0.0),
-        "nu": Param("1", low=0.05, high=0.49, default=0.45, logarithmic=False),
+        "nu": Param("1", low=0.05, high=0.48, default=0.45, logarithmic=False),
     },
 )

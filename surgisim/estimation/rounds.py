@@ -1,0 +1,127 @@
+"""The few numbers of a clip: which support, which start, then descents over growing windows.
+
+The paper restarts from frame 0 for every k further frames, which costs O(n^2). Here each round's
+window is twice the last, so all rounds together cost at most twice the last one: O(n).
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from surgisim.config.estimation import Estimation
+from surgisim.estimation.gauss_newton import Solution, gauss_newton, misfit
+from surgisim.estimation.observation import PHASES
+from surgisim.estimation.search import Search
+from surgisim.estimation.support import Support
+from surgisim.estimation.trial import WORKERS, Trial, at_once
+from surgisim.problem import Problem
+
+INDEPENDENT = 0.02
+"""Share of residuals counted as independent: neighbouring points and frames share their tracking error."""
+RATIOS = (0.40, 0.47)
+"""Poisson's ratios at which supports are compared: both shape the spread of a load, so neither is judged alone."""
+SETTLED = 4
+"""Frames after a release that the first window must hold, or it says nothing of modulus and viscosity."""
+
+Say = Callable[[float, float, str], None]
+
+
+def choose_support(trial: Trial, choices: list[Support], phase: np.ndarray, history: list, say: Say) -> Support:
+    """The support whose pull and hold fit best; the body's own unless another is clearly better."""
+    driven = trial.fitted[phase[trial.fitted] < PHASES.index("release")]
+    ratios = [k for k, (_, p, _) in enumerate(trial.wanted.free) if p == "nu"]
+    if len(choices) < 2 or not len(driven):
+        return choices[0]
+    last = int(driven[-1])
+    points = []
+    for value in RATIOS if ratios else (None,):
+        x = trial.wanted.start.copy()
+        x[ratios] = value
+        points.append(x)
+    jobs = [(choice, x) for choice in choices for x in points]
+    say(0.03, 1.0, f"comparing {len(choices)} ways the body may be held")
+
+    def cost(job, worker):
+        choice, x = job
+        r = replace(trial, held=choice.held).residual(x, worker, last)
+        return np.inf if r is None else INDEPENDENT * misfit(r)
+
+    costs = np.array(at_once(cost, jobs)).reshape(len(choices), -1).min(1)
+    for choice, c in zip(choices, costs, strict=True):
+        history.append({"round": "support", "depth": choice.depth, "rim": choice.rim, "cost": number(c)})
+    best = int(np.argmin(costs))
+    return choices[best] if costs[best] < 0.95 * costs[0] else choices[0]
+
+
+def choose_start(trial: Trial, history: list, say: Say) -> np.ndarray:
+    """The best of a few starting points.
+
+    A ring-down misfits by whole periods: from a modulus a few times too high, a descent ends there.
+    """
+    wanted, points = trial.wanted, trial.wanted.starts()
+    say(0.1, 1.0, f"trying {len(points)} starts")
+    results = at_once(lambda x, worker: trial.residual(x, worker), points)
+    costs = [
+        np.inf if r is None else INDEPENDENT * misfit(r) + float((((x - wanted.start) / wanted.spread) ** 2).sum())
+        for r, x in zip(results, points, strict=True)
+    ]
+    for x, cost in zip(points, costs, strict=True):
+        history.append({"round": "start", "cost": number(cost)} | plain(wanted, x))
+    if not np.isfinite(costs).any():
+        raise Problem(
+            "estimation: the body turns inside out under the recorded motion at every start. Check the grip and its "
+            "path (tracking), or start from other values (estimation.start)."
+        )
+    return points[int(np.argmin(costs))]
+
+
+def descend(trial: Trial, x: np.ndarray, phase: np.ndarray, settings: Estimation, history: list, say: Say) -> Solution:
+    """Gauss-Newton over growing windows from x."""
+    wanted, ends = trial.wanted, windows(trial.fitted, phase, settings.first_window)
+    for k, last in enumerate(ends):
+
+        def said(iteration, x, cost, k=k, last=last):
+            values = {n: float(f"{v:.4g}") for n, v in plain(wanted, x).items()}
+            history.append({"round": k, "last_frame": int(last), "iteration": iteration, "cost": cost} | values)
+            done = 0.25 + 0.45 * (k + iteration / settings.iterations) / len(ends)
+            say(done, 1.0, f"round {k + 1}/{len(ends)}, iteration {iteration}: {values}")
+
+        solution = gauss_newton(
+            partial(trial.residual, last=last),
+            x,
+            prior=wanted.start,
+            spread=wanted.spread,
+            bounds=wanted.bounds,
+            share=INDEPENDENT,
+            iterations=settings.iterations,
+            workers=WORKERS,
+            said=said,
+        )
+        x = solution.x
+    return solution
+
+
+def windows(fitted: np.ndarray, phase: np.ndarray, share: float) -> list[int]:
+    """Last frames of the rounds: each window twice the one before; the first holds the release, if there is one."""
+    end = int(fitted[-1])
+    released = np.flatnonzero(phase[: end + 1] == PHASES.index("release"))
+    loaded = np.flatnonzero(phase[: end + 1] > 0)
+    needed = released[0] + SETTLED if len(released) else (loaded[0] + SETTLED if len(loaded) else 2)
+    first = max(int(needed), int(share * end), 2)
+    ends = [end]
+    while ends[0] // 2 >= first:
+        ends.insert(0, int(fitted[np.searchsorted(fitted, ends[0] // 2)]))
+    return ends
+
+
+def plain(wanted: Search, x: np.ndarray) -> dict[str, float]:
+    """'law.parameter' -> value at x."""
+    values = wanted.values(x)
+    return {f"{law}.{param}": values[law][param] for law, param, _ in wanted.free}
+
+
+def number(value: float) -> float | None:
+    """JSON has no NaN and no infinity: a number that could not be had is null."""
+    return float(value) if np.isfinite(value) else None
