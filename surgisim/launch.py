@@ -150,14 +150,16 @@ def _hear(line: str, state: State, out: Path, debug: bool) -> None:
         state.complaints.append(said["text"])
 
 
-def why(job: Job) -> str:
-    """One sentence on why a job failed, from its log."""
+def why(job: Job, said: Sequence[str] = ()) -> str:
+    """One sentence on why a job failed, from its log, and from what the shell said of its end."""
     lines = [line for line in tail(job.log, 20000) if line.strip()]
     for line in reversed(lines):
         if line.startswith("error: "):
             return line.removeprefix("error: ")
     if any(line.startswith("Traceback") for line in lines):
         return f"{lines[-1]} (a fault of the program, not of the input; {job.log} has the details)"
+    if any("Segmentation fault" in line for line in said):
+        return f"crashed (a fault of the program, not of the input; {job.log} has what it said before)"
     return f"stopped without a word; was it killed, for want of memory perhaps? ({job.log} has what it said before)"
 
 

@@ -154,13 +154,15 @@ def _announce(console: Console, state: State) -> None:
 
 def _answer(console: Console, todo: Plan, out: Path, code: int, state: State, order: Order, seconds: float) -> int:
     for job in state.failed:
-        console.print(f"[red]error[/]: {escape(job.name)}: {escape(why(job))}")
+        console.print(f"[red]error[/]: {escape(job.name)}: {escape(why(job, state.said))}")
     if code and not state.failed:
         said = state.complaints or state.said or ["Snakemake stopped without a word"]
         console.print(f"[red]error[/]: {escape(' '.join(said[-1 if order.debug else 0].split()))}")
     if code:
         console.print("The same command goes on from here once this is mended; what was finished is kept.")
-        return 2 if state.failed and all(" fault of the program" not in why(j) for j in state.failed) else code
+        return (
+            2 if state.failed and all(" fault of the program" not in why(j, state.said) for j in state.failed) else code
+        )
     did = [job for job in state.jobs.values() if job.rule != "all"]
     console.print(f"{len(did)} jobs in {seconds:.0f} s" if did else "nothing to do: everything is up to date")
     for clip in todo.clips:

@@ -78,6 +78,13 @@ def test_a_fault_of_the_program_says_so_and_names_the_log(tree):
     assert "logs/demo/main/depth.log" in said
 
 
+@pytest.mark.parametrize(("number", "wanted"), [(9, "was it killed"), (11, "crashed (a fault of the program")])
+def test_a_stage_that_dies_without_a_word_says_what_is_known(tree, number, wanted):
+    script = tree.root / "stages" / "phantom.py"
+    script.write_text(f"import os\nos.kill(os.getpid(), {number})\n" + script.read_text())
+    assert wanted in sentence(tree.surgisim("demo", "--out", "there"))
+
+
 def test_settings_by_file_and_by_flag_reach_the_stages(tree):
     (tree.root / "mine.yaml").write_text("ingest: {size: 100, tail: 0.3}\n")
     done = tree.surgisim("demo", "--out", "there", "--config", "mine.yaml", "--set", "ingest.size=90", "-n")
