@@ -164,14 +164,24 @@ def _settled(course: np.ndarray, end: int, frames: int) -> int:
 
 def _grip(start, course, contact: Contact, held, seen, times: tuple[int, int, int], side: int, cell: float) -> Grip:
     begin, top, end = times
-    step = np.diff(course[begin : end + 1], axis=0)
-    length = np.linalg.norm(step, axis=-1)
-    gap = np.linalg.norm(contact.mean_velocity(held)[begin:end] - step, axis=-1)
-    moving = length > 0.3
-    along = (length * (gap < 0.5 * length + 0.3))[moving].sum() / max(length[moving].sum(), 1e-9)
+    along = _along(course, contact.mean_velocity(held), seen[held].sum(0) >= SHOWN, begin, end)
     touching = (np.median(contact.away[held, begin : end + 1], axis=0) < 2 * TOUCH * side).mean()
     size = 1 - np.exp(-np.linalg.norm(course[top]) / (2 * LEAST * side))
     shown = min(1.0, 2.5 * seen[held, begin : end + 1].mean())
     radius = float(np.clip(np.sqrt(len(start) * cell / np.pi), 0.015 * side, 0.1 * side))
     confidence = float(size * (0.3 + 0.7 * along) * (0.3 + 0.7 * touching) * (0.3 + 0.7 * shown))
     return Grip(start.mean(0), radius, begin, end, confidence)
+
+
+def _along(course: np.ndarray, tool: np.ndarray, shown: np.ndarray, begin: int, end: int) -> float:
+    """How far the instrument goes where the tissue goes, 0-1, a few frames at a time; 0.5 if neither can be seen."""
+    agreed, total = 0.0, 0.0
+    for t in range(begin, end):
+        until = min(t + SOON, end)
+        if not (shown[t] and shown[until] and np.isfinite(tool[t:until]).all()):
+            continue
+        tissue, jaws = course[until] - course[t], tool[t:until].sum(0)
+        way = max(np.linalg.norm(tissue), np.linalg.norm(jaws))
+        agreed += max(way - np.linalg.norm(tissue - jaws), 0.0)
+        total += way
+    return float(agreed / total) if total > 1.0 else 0.5
