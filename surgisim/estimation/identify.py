@@ -44,16 +44,25 @@ def identifiability(
                 value + 1.645 * sd,
             )
         )
-        told = sd <= TOLD * prior
+        edge = _at_edge(search, solution.x, direction)
+        told = sd <= TOLD * prior and not edge
         result[name] = {
             "value": float(value),
             "low": float(low),
             "high": float(high),
             "unit": unit,
             "told": bool(told),
+            "at_edge": edge,
             "phases": {n: round(v / total, 3) if total > 0 else 0.0 for n, v in by_phase.items()},
         }
     return result
+
+
+def _at_edge(search: Search, x: np.ndarray, direction: np.ndarray) -> bool:
+    """Whether a quantity rests on a parameter that ended at the limit of its range: the range answered, not the clip."""
+    low, high = search.bounds
+    margin = 0.01 * (high - low)
+    return bool(((direction != 0) & ((x < low + margin) | (x > high - margin))).any())
 
 
 def _quantities(search: Search, x: np.ndarray, density: float, length: float):
@@ -75,7 +84,8 @@ def _quantities(search: Search, x: np.ndarray, density: float, length: float):
 def in_words(table: dict, steps: int, before: float, after: float) -> str:
     """The outcome of a fit for a person."""
     told = [n for n, q in table.items() if q["told"]]
-    untold = [n for n, q in table.items() if not q["told"]]
+    edges = [n for n, q in table.items() if q["at_edge"]]
+    untold = [n for n, q in table.items() if not q["told"] and not q["at_edge"]]
     parts = [
         f"On frames that were never fitted, simulated and tracked points of the moving tissue are "
         f"{after * 1e3:.3f} mm apart on average ({before * 1e3:.3f} mm with default parameters), "
@@ -85,6 +95,12 @@ def in_words(table: dict, steps: int, before: float, after: float) -> str:
         parts.append("The clip tells " + ", ".join(_quoted(n, table[n]) for n in told) + ".")
     if untold:
         parts.append("It cannot tell " + ", ".join(untold) + ": those stay near where the fit began.")
+    if edges:
+        parts.append(
+            "At the limit of the range that was searched, so more likely making up for something else than measured: "
+            + ", ".join(_quoted(n, table[n]) for n in edges)
+            + "."
+        )
     return " ".join(parts)
 
 
