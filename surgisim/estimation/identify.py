@@ -59,7 +59,7 @@ def identifiability(
 
 
 def _at_edge(search: Search, x: np.ndarray, direction: np.ndarray) -> bool:
-    """Whether a quantity rests on a parameter that ended at the limit of its range: the range answered, not the clip."""
+    """Whether a quantity rests on a parameter at the limit of its range: there the range answered, not the clip."""
     low, high = search.bounds
     margin = 0.01 * (high - low)
     return bool(((direction != 0) & ((x < low + margin) | (x > high - margin))).any())

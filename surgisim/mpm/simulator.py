@@ -27,7 +27,7 @@ from surgisim.mpm.kernels import (
 )
 from surgisim.problem import Problem
 
-wp.config.quiet = True
+wp.config.log_level = wp.LOG_WARNING
 
 NEVER = 2**31 - 1
 
@@ -89,6 +89,9 @@ class Simulator:
         self.force = wp.zeros(len(self.place), dtype=wp.vec3, device=device)
         self.scatter = not wp.get_device(device).is_cuda
         self.kernels = particle_kernels(self.terms, self.scatter)
+        # Loaded here, once: two threads that load one module at their first launch crash the process.
+        for kernel in (self.kernels.step, self.kernels.adjoint, node_step):
+            wp.load_module(kernel.module, device=device)
 
     # Forward
 
