@@ -59,7 +59,7 @@ def replay(
         simulator, run, k = states[t]
         key = id(simulator)
         if key not in looks:
-            looks[key] = _Look(simulator, body, scene, settings, physics, theta)
+            looks[key] = _Look(simulator, body, scene, settings, physics, theta, task.cut is not None)
         full = simulator.displaced(run.u[k])
         moved, least, joules = looks[key].measure(full, run.v[k])
         position.append(moved.astype(np.float32))
@@ -114,7 +114,16 @@ def _march(parts: list[Simulator], theta, path: Drive, task: Plan, progress):
 class _Look:
     """What is read off a state: particles, det F, energy, and the splats to draw."""
 
-    def __init__(self, simulator: Simulator, body: Body, scene: Scene, settings: Simulation, physics: Physics, theta):
+    def __init__(
+        self,
+        simulator: Simulator,
+        body: Body,
+        scene: Scene,
+        settings: Simulation,
+        physics: Physics,
+        theta: np.ndarray,
+        opened: bool,
+    ) -> None:
         self.simulator, self.body = simulator, body
         self.nodes, self.weight, self.gradient = simulator.stencil(body.rest.astype(float))
         self.mass = simulator.mass.numpy()
@@ -128,7 +137,7 @@ class _Look:
         if settings.render:
             from surgisim.simulation.draw import Drawn
 
-            self.drawn = Drawn(scene, body, simulator, settings.interior)
+            self.drawn = Drawn(scene, body, simulator, settings.interior and opened)
 
     def measure(self, full: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, float, tuple[float, float]]:
         """Particle positions [m], (P, 3); smallest det F; kinetic and elastic energy [J]."""
