@@ -112,7 +112,7 @@ def estimate(
             "support": {"depth": support.depth, "rim": support.rim},
             "phases": [PHASES[k] for k in phase],
         },
-        words=in_words(table, path.per_frame, before, after),
+        words=in_words(table, support, path.per_frame, before, after),
     )
     names = np.array(columns(choose(bodies[0].terms)))
     material = Material(names, theta.astype(np.float32), support.held)

@@ -4,6 +4,7 @@ import numpy as np
 
 from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.search import Search
+from surgisim.estimation.support import Support
 
 TOLD = 0.5
 """A number counts as told by the clip when its posterior spread is at most this share of the prior's."""
@@ -81,7 +82,7 @@ def _quantities(search: Search, x: np.ndarray, density: float, length: float):
         yield f"{m} / (density length^2)", np.eye(len(x))[place[m]], E / (density * length**2), "1/s^2", True
 
 
-def in_words(table: dict, steps: int, before: float, after: float) -> str:
+def in_words(table: dict, support: Support, steps: int, before: float, after: float) -> str:
     """The outcome of a fit for a person."""
     told = [n for n, q in table.items() if q["told"]]
     edges = [n for n, q in table.items() if q["at_edge"]]
@@ -89,7 +90,9 @@ def in_words(table: dict, steps: int, before: float, after: float) -> str:
     parts = [
         f"On frames that were never fitted, simulated and tracked points of the moving tissue are "
         f"{after * 1e3:.3f} mm apart on average ({before * 1e3:.3f} mm with default parameters), "
-        f"with {steps} steps a frame."
+        f"with {steps} steps a frame.",
+        f"It moves most like tissue held {support.depth * 1e3:.0f} mm below its surface, with its rim "
+        f"{'held' if support.rim else 'free'}.",
     ]
     if told:
         parts.append("The clip tells " + ", ".join(_quoted(n, table[n]) for n in told) + ".")

@@ -95,11 +95,15 @@ def _scene(story: Story) -> Iterator[Doubt]:
 
 
 def _physics(story: Story) -> Iterator[Doubt]:
-    unknown = [
-        name
-        for name, found in story.run.fit.identifiability.items()
-        if isinstance(found, dict) and found.get("told") is False
-    ]
+    table = story.run.fit.identifiability
+    edges = [name for name, found in table.items() if found.get("at_edge")]
+    unknown = [name for name, found in table.items() if not found["told"] and name not in edges]
+    if edges:
+        yield Doubt(
+            True,
+            f"{', '.join(edges)} ended at the limit of the range that was searched: more likely making up for a wrong "
+            "depth, grip or support than measured.",
+        )
     if unknown:
         yield Doubt(
             False,

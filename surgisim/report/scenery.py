@@ -50,7 +50,7 @@ def colors(story: Story) -> np.ndarray:
     """Particles' own colours, held ones marked, (P, 3) 0-255."""
     body = story.run.body
     own = 255 * body.color.astype(float)
-    return np.where(body.held[:, None], 0.35 * own + 0.65 * rgb(HELD), own)
+    return np.where(story.material.held[:, None], 0.35 * own + 0.65 * rgb(HELD), own)
 
 
 def body_views(story: Story, size: tuple[int, int]) -> dict[str, str]:
