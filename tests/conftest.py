@@ -1,15 +1,6 @@
-"""What tests of several rooms use."""
+"""What every test shares: threads that wait their turn instead of spinning for it."""
 
-from pathlib import Path
+import os
 
-import pytest
-
-SHARED = Path(__file__).parents[2] / "shared"
-
-
-@pytest.fixture(scope="session")
-def shared() -> Path:
-    """Recordings and weights beside the project; a test that needs them is skipped where they are not."""
-    if not SHARED.is_dir():
-        pytest.skip(f"NO SHARED DATA: {SHARED} is not there, so this test did not run.")
-    return SHARED
+# Before torch is imported anywhere: on a busy machine its idle threads would keep both cores from working.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
