@@ -17,8 +17,13 @@ class Physics(JsonArtifact):
     grid: dict[str, float]
     """{"spacing" [m], "step" [s]}: fitted numbers hold for these and travel with them."""
 
+    grip: float = 1.0
+    """How firmly instruments hold, as a share of the tissue's own stiffness; below 1 where a firmer grip would turn
+    the tissue inside out, so that it slips instead [1]."""
+
     UNITS = {"density": "kg/m^3", "gravity": "m/s^2"}
 
     def __post_init__(self) -> None:
         check(self.density > 0, f"Physics: density {self.density} must be > 0.")
+        check(0 < self.grip <= 1, f"Physics: grip {self.grip} must be above 0 and at most 1.")
         check(set(self.grid) == {"spacing", "step"}, f"Physics: grid has {sorted(self.grid)}, not spacing and step.")

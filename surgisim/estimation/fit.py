@@ -1,6 +1,7 @@
 """The whole estimation: support and start, rounds, a field where it pays, then what is known."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
 from surgisim.estimation.picture import picture_loss
 from surgisim.estimation.refine import Refined, refine
-from surgisim.estimation.rounds import INDEPENDENT, choose_start, choose_support, descend, number
+from surgisim.estimation.rounds import INDEPENDENT, choose_start, choose_support, descend, number, settle_grip
 from surgisim.estimation.search import Search, search
 from surgisim.estimation.support import supports
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
@@ -67,9 +68,10 @@ def estimate(
     choices = supports(body, camera)
     support, x, history, table = choices[0], wanted.start, [], {}
     if settings.enabled:
+        trial, _ = settle_grip(trial, history)
         support = choose_support(trial, choices, phase, history, progress) if settings.support else support
-        trial = Trial(bodies, wanted, motion, observation, support.held, camera.fps, total, fitted)
-    default = trial.run(wanted.start)
+        trial = replace(trial, held=support.held)
+    trial, default = settle_grip(trial, history)
     if settings.enabled and wanted.free:
         solution = descend(trial, choose_start(trial, history, progress), phase, settings, history, progress)
         x = solution.x
@@ -82,8 +84,8 @@ def estimate(
     theta, refined = bodies[0].theta(values), None
     if settings.enabled:
         theta, refined = _refined(trial, values, scene, frames, masks, camera, settings, progress)
-    path = trial.drive(values, stiffest=_stiffest(bodies[0], theta))
-    final = bodies[0].simulator.run(theta, path)
+    trial, final = settle_grip(trial, history, theta, values)
+    path = trial.drive(values, stiffest=bodies[0].stiffest(theta))
     errors = {
         name: {"default": number(observation.error(default.u, at)), "fitted": number(observation.error(final.u, at))}
         for name, at in {
@@ -109,14 +111,15 @@ def estimate(
             "frames": held_out.tolist(),
             "points": int(observation.moving.sum()),
             "field_kept": bool(refined.kept) if refined else False,
+            "grip": trial.grip,
             "support": {"depth": support.depth, "rim": support.rim},
             "phases": [PHASES[k] for k in phase],
         },
-        words=in_words(table, support, path.per_frame, before, after),
+        words=in_words(table, support, trial.grip, path.per_frame, before, after),
     )
     names = np.array(columns(choose(bodies[0].terms)))
     material = Material(names, theta.astype(np.float32), support.held)
-    return material, _physics(bodies[0], values, table, settings, path.step), fit
+    return material, _physics(bodies[0], values, table, settings, path.step, trial.grip), fit
 
 
 def _nothing_to_learn(motion: Motion, body: Body) -> str:
@@ -165,13 +168,9 @@ def _refined(
     return refined.theta, refined
 
 
-def _stiffest(prepared: Prepared, theta: np.ndarray) -> Values:
-    """The largest value of every parameter on any particle: what bounds the step."""
-    top = dict(zip(columns(choose(prepared.terms)), theta.max(0).tolist(), strict=True))
-    return {law: {p: top[f"{law}.{p}"] for p in t.params} for law, t in choose(prepared.terms).items()}
-
-
-def _physics(prepared: Prepared, values: Values, table: dict, settings: Estimation, step: float) -> Physics:
+def _physics(
+    prepared: Prepared, values: Values, table: dict, settings: Estimation, step: float, grip: float = 1.0
+) -> Physics:
     terms = {}
     for law, term in choose(prepared.terms).items():
         terms[law] = {}
@@ -182,7 +181,7 @@ def _physics(prepared: Prepared, values: Values, table: dict, settings: Estimati
                 entry |= {"low": known["low"], "high": known["high"], "identifiable": known["told"]}
             terms[law][name] = entry
     grid = {"spacing": prepared.simulator.grid.spacing, "step": step}
-    return Physics(terms, settings.density, list(settings.gravity), grid)
+    return Physics(terms, settings.density, list(settings.gravity), grid, grip)
 
 
 def _unfitted(prepared: Prepared, wanted: Search, settings: Estimation, camera: Camera, why: str):

@@ -52,6 +52,9 @@ def gauss_newton(
     def jacobian_at(x: np.ndarray, r: np.ndarray) -> np.ndarray:
         side = np.where(x + DIFFERENCE <= high, 1.0, -1.0) * DIFFERENCE
         shifted = at_once(residual, [x + side[m] * np.eye(len(x))[m] for m in range(len(x))], workers)
+        for m in [m for m, s in enumerate(shifted) if s is None]:
+            side[m] = -side[m]
+            shifted[m] = residual(np.clip(x + side[m] * np.eye(len(x))[m], low, high), 0)
         if any(s is None for s in shifted):
             raise Problem(
                 "estimation: the simulation breaks down a small step beside the current parameters. "

@@ -82,7 +82,7 @@ def _quantities(search: Search, x: np.ndarray, density: float, length: float):
         yield f"{m} / (density length^2)", np.eye(len(x))[place[m]], E / (density * length**2), "1/s^2", True
 
 
-def in_words(table: dict, support: Support, steps: int, before: float, after: float) -> str:
+def in_words(table: dict, support: Support, grip: float, steps: int, before: float, after: float) -> str:
     """The outcome of a fit for a person."""
     told = [n for n, q in table.items() if q["told"]]
     edges = [n for n, q in table.items() if q["at_edge"]]
@@ -94,6 +94,11 @@ def in_words(table: dict, support: Support, steps: int, before: float, after: fl
         f"It moves most like tissue held {support.depth * 1e3:.0f} mm below its surface, with its rim "
         f"{'held' if support.rim else 'free'}.",
     ]
+    if grip < 1:
+        parts.append(
+            f"Held firmly, the tissue would turn inside out under the grip's path; it is held with {grip:g} of the "
+            "full stiffness and slips."
+        )
     if told:
         parts.append("The clip tells " + ", ".join(_quoted(n, table[n]) for n in told) + ".")
     if untold:

@@ -16,16 +16,40 @@ from surgisim.estimation.observation import PHASES
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import Support
 from surgisim.estimation.trial import WORKERS, Trial, at_once
+from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.problem import Problem
 
 INDEPENDENT = 0.02
 """Share of residuals counted as independent: neighbouring points and frames share their tracking error."""
 RATIOS = (0.40, 0.47)
 """Poisson's ratios at which supports are compared: both shape the spread of a load, so neither is judged alone."""
+GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
+"""How firmly instruments may hold, tried in turn."""
 SETTLED = 4
 """Frames after a release that the first window must hold, or it says nothing of modulus and viscosity."""
 
 Say = Callable[[float, float, str], None]
+
+
+def settle_grip(trial: Trial, history: list, theta=None, values=None) -> tuple[Trial, Run]:
+    """The trial with the firmest grip, not firmer than its own, under which the whole clip can be simulated.
+
+    Tracks at the jaws are the worst there are, and a firm grip that follows them can turn the tissue inside
+    out; a softer one lets it slip. theta: per-particle parameters (P, M) about the uniform `values`; those of
+    the start if None. Raises Problem when even the softest does not help.
+    """
+    body, values = trial.bodies[0], values or trial.wanted.values(trial.wanted.start)
+    theta = body.theta(values) if theta is None else theta
+    for share in [g for g in GRIPS if g <= trial.grip]:
+        softer = replace(trial, grip=share)
+        try:
+            return softer, body.simulator.run(theta, softer.drive(values, stiffest=body.stiffest(theta)))
+        except Breakdown as breakdown:
+            history.append({"round": "grip", "share": share, "cost": None, "broke": str(breakdown)})
+    raise Problem(
+        "estimation: the body turns inside out under the recorded motion however softly it is held. Check the "
+        "grip and its path (tracking), or give it (--grasp)."
+    )
 
 
 def choose_support(trial: Trial, choices: list[Support], phase: np.ndarray, history: list, say: Say) -> Support:

@@ -33,13 +33,16 @@ class Trial:
     frames: int
     fitted: np.ndarray
     """Frames that may be looked at."""
+    grip: float = 1.0
+    """How firmly instruments hold, see Physics."""
 
     def drive(self, values: Values, *, frames: int | None = None, safety: float = SAFETY, stiffest=None) -> Drive:
         """The clip's motion at a step that is stable for `stiffest` (or `values`)."""
         per_frame = self.bodies[0].per_frame(stiffest or values, self.fps, safety)
         return self.bodies[0].drive(
-            self.motion, values, fps=self.fps, per_frame=per_frame, frames=frames or self.frames, held=self.held
-        )
+            self.motion, values, fps=self.fps, per_frame=per_frame, frames=frames or self.frames, held=self.held,
+            grip=self.grip,
+        )  # fmt: skip
 
     def run(self, x: np.ndarray, worker: int = 0, last: int | None = None) -> Run:
         """Simulate at x, up to frame `last`."""

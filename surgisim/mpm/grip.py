@@ -28,8 +28,8 @@ class Drive:
     """[s]"""
     per_frame: int
     """Steps between two frames."""
-    stiffness: float
-    """Spring that holds a particle to its anchor, per unit of mass [1/s^2]."""
+    stiffness: np.ndarray
+    """Spring that holds a particle to each anchor, per unit of mass [1/s^2], (1 + J,)."""
 
     @property
     def steps(self) -> int:
@@ -49,10 +49,12 @@ def drive(
     fps: float,
     per_frame: int,
     stiffness: float,
+    grip: float = 1.0,
     frames: int | None = None,
 ) -> Drive:
     """The boundary condition of a replay of `motion` on particles `rest` [m], (P, 3).
 
+    stiffness: spring of the anchors per unit of mass [1/s^2]; `grip` is the share of it that instruments get.
     Between frames the path is a monotone cubic (Fritsch and Carlson, 1980), so the instrument does
     not jerk at every frame; before and after its active frames a grip holds nothing.
     Raises Problem if a grip holds no particle, or more than 31 grips are asked for.
@@ -84,4 +86,5 @@ def drive(
         on = motion.active[j].astype(bool)
         frame = np.minimum(np.arange(steps) // per_frame, len(on) - 1)
         active[1 + j] = on[frame] & on[np.minimum(frame + 1, len(on) - 1)]
-    return Drive(member, path, active, step, per_frame, stiffness)
+    springs = stiffness * np.concatenate([[1.0], np.full(grips, grip)])
+    return Drive(member, path, active, step, per_frame, springs)

@@ -90,7 +90,7 @@ class Anchors:
     member: wp.array(dtype=int)
     path: wp.array2d(dtype=wp.vec3)
     active: wp.array2d(dtype=int)
-    stiffness: float
+    stiffness: wp.array(dtype=float)
 
 
 @wp.kernel(enable_backward=False)
@@ -223,7 +223,7 @@ def particle_kernels(names: tuple[str, ...], scatter: bool) -> SimpleNamespace:
                     if located == 0:
                         x = carried(u, index, link, slot, p)
                         located = 1
-                    pull += (weight[p] * anchors.stiffness) * (anchors.path[a, n] - x)
+                    pull += (weight[p] * anchors.stiffness[a]) * (anchors.path[a, n] - x)
         if wp.static(scatter):
             for k in range(index.shape[1]):
                 w = link[p, k]
@@ -271,8 +271,8 @@ def particle_kernels(names: tuple[str, ...], scatter: bool) -> SimpleNamespace:
         if held > 0:
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.active[a, clock[1]] == 1:
-                    spring += weight[p]
-        dx = (-anchors.stiffness * spring) * b
+                    spring += weight[p] * anchors.stiffness[a]
+        dx = (-spring) * b
         if wp.static(scatter):
             for k in range(index.shape[1]):
                 w = link[p, k]

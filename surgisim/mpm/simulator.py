@@ -228,7 +228,7 @@ class Simulator:
         anchors.member = wp.array(drive.member.astype(np.int32), dtype=int, device=self.device)
         anchors.path = wp.array(drive.path.astype(np.float32), dtype=wp.vec3, device=self.device)
         anchors.active = wp.array(drive.active.astype(np.int32), dtype=int, device=self.device)
-        anchors.stiffness = float(drive.stiffness)
+        anchors.stiffness = wp.array(drive.stiffness.astype(np.float32), dtype=float, device=self.device)
         return anchors
 
     def _reset(self, step: int) -> None:

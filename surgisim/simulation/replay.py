@@ -47,7 +47,13 @@ def replay(
     per_frame = checked_per_frame(physics, material, camera.fps) * settings.refine_step
     parts = _parts(body, scene, physics, task, settings.device)
     path = parts[0].drive(
-        task.motion, values_of(physics), fps=camera.fps, per_frame=per_frame, frames=len(task.base), held=material.held
+        task.motion,
+        values_of(physics),
+        fps=camera.fps,
+        per_frame=per_frame,
+        frames=len(task.base),
+        held=material.held,
+        grip=physics.grip,
     )
     clock = np.arange(path.steps + 1) / per_frame
     path.path[0] = np.stack([np.interp(clock, np.arange(len(task.base)), task.base[:, a]) for a in range(3)], -1)

@@ -121,6 +121,16 @@ def test_a_stiff_half_is_found_by_the_refinement():
     assert E[right].mean() > 1.15 * E[~right].mean()
 
 
+def test_a_path_that_would_turn_the_tissue_inside_out_lets_it_slip_and_says_so():
+    case = list(clip())
+    wild = pulled(frames=T, hold=9, by=(0.0, 0.0, 0.03))
+    case[3] = replace(wild, center_rest=case[3].center_rest)
+    _, physics, fit = estimate(*case, Estimation(**{**QUICK, "iterations": 1, "support": False}), silent)
+    assert physics.grip < 1
+    assert fit.held_out["grip"] == physics.grip
+    assert "slips" in fit.words
+
+
 def test_rounds_double_so_that_their_sum_stays_below_twice_the_clip():
     for frames in (24, 100, 400):
         ends = windows(np.arange(1, frames), phases(pulled(frames=frames, hold=9), frames), 0.1)
