@@ -11,6 +11,8 @@ import yaml
 from rich.console import Console
 from rich.markup import escape
 
+from surgisim.artifacts.base import load
+from surgisim.artifacts.fit import Fit
 from surgisim.clips import EMBEDDED, merge_entry, value
 from surgisim.config.base import parse
 from surgisim.config.whole import PARENTS, Whole, rooted
@@ -170,6 +172,9 @@ def _answer(console: Console, todo: Plan, out: Path, code: int, state: State, or
             page = out / "results" / clip / variant / "report" / "report.html"
             if page.is_file():
                 console.print(f"report   {escape(str(page))}")
+            fit = out / "results" / clip / variant / "estimation" / "fit.json"
+            if fit.is_file():
+                console.print(f"         {escape(load(Fit, fit).words)}", soft_wrap=True)
     if (out / "results" / "summary.html").is_file():
         console.print(f"summary  {escape(str(out / 'results' / 'summary.html'))}")
     return 0

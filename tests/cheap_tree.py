@@ -17,6 +17,7 @@ CHEAP = '''"""Write one line to every output."""
 import sys
 from pathlib import Path
 
+FIT = '{"header": {"kind": "Fit"}, "history": [], "identifiability": {}, "held_out": {}, "words": "Not fitted."}'
 stage = Path(__file__).stem
 if (Path(__file__).parents[1] / "broken").exists() and stage in (Path(__file__).parents[1] / "broken").read_text():
     sys.exit("error: " + stage + " is broken on purpose.")
@@ -24,7 +25,7 @@ inputs = [Path(a) for a in sys.argv[1:] if "/" in a and not a.startswith(("bench
 for path in inputs:
     if stage == path.parent.name or stage == path.stem == "summary":
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(stage)
+        path.write_text(FIT if path.name == "fit.json" else stage)
 sys.exit()
 '''
 

@@ -29,6 +29,9 @@ from surgisim.physics.catalogue import choose, columns
 
 Say = Callable[[float, float, str], None]
 
+STILL = 0.5
+"""Motion below which a track is taken to stand still [px]."""
+
 
 def estimate(
     body: Body,
@@ -56,7 +59,7 @@ def estimate(
         )
         for _ in range(WORKERS)
     ]  # fmt: skip
-    reason = _nothing_to_learn(motion, body)
+    reason = _nothing_to_learn(motion, tracks, body)
     if reason:
         return _unfitted(bodies[0], wanted, settings, camera, reason)
     observation = observe(tracks, motion, bodies[0].simulator, floor=0.02 * body.spacing)
@@ -122,8 +125,14 @@ def estimate(
     return material, _physics(bodies[0], values, table, settings, path.step, trial.grip), fit
 
 
-def _nothing_to_learn(motion: Motion, body: Body) -> str:
+def _nothing_to_learn(motion: Motion, tracks: Tracks, body: Body) -> str:
     """Why nothing drives the body, or an empty string."""
+    moved = np.where(tracks.visible, np.linalg.norm(tracks.xy - tracks.xy[:, :1], axis=-1), 0.0)
+    if moved.size and np.percentile(moved.max(1), 99) < STILL:
+        return (
+            "Nothing moves in this clip, so there is no motion to learn its physics from; the scene is reconstructed "
+            "all the same, and a simulation of it runs with default parameters."
+        )
     if not len(motion.radius):
         return (
             "No instrument was found that holds tissue: nothing drives the body, so its physics cannot be learned from "

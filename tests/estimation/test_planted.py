@@ -98,6 +98,13 @@ def test_a_grip_that_never_moves_teaches_nothing():
     assert "no motion to learn" in estimate(*case, Estimation(**QUICK), silent)[2].words
 
 
+def test_a_still_clip_is_called_still():
+    case = list(clip())
+    xy = np.repeat(case[2].xy[:, :1], T, 1)
+    case[2] = replace(case[2], xy=xy)
+    assert "Nothing moves in this clip" in estimate(*case, Estimation(**QUICK), silent)[2].words
+
+
 def test_frames_held_out_are_never_looked_at():
     case = clip()
     first = estimate(*case, Estimation(**QUICK), silent)
