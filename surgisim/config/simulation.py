@@ -15,8 +15,7 @@ class Simulation(Settings):
     render: bool = True
     """Whether to draw the frames [-]."""
     interior: bool = True
-    """Whether to draw the thickened interior behind the surface where something is cut, so that the cut shows tissue.
-    Elsewhere it could only shine through slanted parts of the surface [-]."""
+    """Whether to draw the thickened interior where the surface opens: in a cut, or behind a flap that moves [-]."""
     refine_step: int = Field(1, ge=1, le=100)
     """Divide the step that travels with the parameters by this, to see that the answer does not depend on it [-]."""
     device: Literal["cpu", "cuda"] = "cpu"

@@ -65,7 +65,7 @@ def replay(
         simulator, run, k = states[t]
         key = id(simulator)
         if key not in looks:
-            looks[key] = _Look(simulator, body, scene, settings, physics, theta, task.cut is not None)
+            looks[key] = _Look(simulator, body, scene, settings, physics, theta)
         full = simulator.displaced(run.u[k])
         moved, least, joules = looks[key].measure(full, run.v[k])
         position.append(moved.astype(np.float32))
@@ -128,7 +128,6 @@ class _Look:
         settings: Simulation,
         physics: Physics,
         theta: np.ndarray,
-        opened: bool,
     ) -> None:
         self.simulator, self.body = simulator, body
         self.nodes, self.weight, self.gradient = simulator.stencil(body.rest.astype(float))
@@ -143,7 +142,7 @@ class _Look:
         if settings.render:
             from surgisim.simulation.draw import Drawn
 
-            self.drawn = Drawn(scene, body, simulator, settings.interior and opened)
+            self.drawn = Drawn(scene, body, simulator, settings.interior)
 
     def measure(self, full: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, float, tuple[float, float]]:
         """Particle positions [m], (P, 3); smallest det F; kinetic and elastic energy [J]."""
