@@ -2,6 +2,9 @@
 
     u_i = 2 u_j - u_k,   j and k the next two nodes inward
 
+Nodes further out than the next to a solid one follow their neighbour instead, u_i = u_j: only splats
+far from the body lean on them, and a straight line drawn on for several cells flies away.
+
 A B-spline whose support touches the body only at its rim has so little mass and stiffness that it
 drifts on its own; the extrapolated one is stable and still reproduces every linear field exactly.
 Hoellig, Reif and Wipper, Weighted extended B-spline approximation of Dirichlet problems, SIAM J.
@@ -10,6 +13,7 @@ Numer. Anal. 39 (2001).
 
 import numpy as np
 from scipy import sparse
+from scipy.ndimage import binary_dilation
 
 from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
@@ -29,17 +33,18 @@ def extension(grid: Grid, mass: np.ndarray, cut: Cut | None) -> tuple[np.ndarray
     place = np.flatnonzero(solid)
     rule = sparse.csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), (len(mass), len(place)))
     known = solid.copy()
+    touched = solid.reshape(-1, *grid.shape).any(0)
+    near = np.tile(binary_dilation(touched, np.ones((3, 3, 3))).ravel(), len(mass) // grid.count)
     hops = [_neighbours(grid, len(mass), axis, sign, cut) for axis in range(3) for sign in (1, -1)]
     for _ in range(PASSES):
         total = sparse.csr_matrix(rule.shape)
         votes = np.zeros(len(mass))
         # Straight lines first; a body one node thick has none, and is followed as a whole.
         for straight in (True, False):
-            for hop in hops:
-                first = hop
-                second = np.where(first >= 0, hop[first], -1)
+            for first in hops:
+                second = np.where(first >= 0, first[first], -1)
                 usable = ~known & (first >= 0) & (votes == 0 if not straight else True)
-                usable &= known[first] & ((second >= 0) & known[second] if straight else True)
+                usable &= known[first] & (near & (second >= 0) & known[second] if straight else True)
                 rows = np.flatnonzero(usable)
                 if not len(rows):
                     continue
