@@ -20,7 +20,7 @@ from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
 from surgisim.estimation.picture import picture_loss
 from surgisim.estimation.refine import Refined, refine
-from surgisim.estimation.rounds import INDEPENDENT, choose_start, choose_support, descend, number, settle_grip
+from surgisim.estimation.rounds import INDEPENDENT, choose_support, number, search_softly, settle_grip
 from surgisim.estimation.search import Search, search
 from surgisim.estimation.support import supports
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
@@ -76,7 +76,7 @@ def estimate(
         trial = replace(trial, held=support.held)
     trial, default = settle_grip(trial, history)
     if settings.enabled and wanted.free:
-        solution = descend(trial, choose_start(trial, history, progress), phase, settings, history, progress)
+        trial, solution = search_softly(trial, phase, settings, history, progress)
         x = solution.x
         phase_of = np.broadcast_to(phase[fitted][None, :, None], (len(observation.rest), len(fitted), 3)).ravel()
         table = identifiability(

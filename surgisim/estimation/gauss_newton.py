@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surgisim.estimation.trial import at_once
-from surgisim.problem import Problem
+from surgisim.mpm.simulator import Breakdown
 
 DIFFERENCE = 0.02
 """Step of the forward differences in search space: well above float32 noise, well below curvature."""
@@ -56,7 +56,7 @@ def gauss_newton(
             side[m] = -side[m]
             shifted[m] = residual(np.clip(x + side[m] * np.eye(len(x))[m], low, high), 0)
         if any(s is None for s in shifted):
-            raise Problem(
+            raise Breakdown(
                 "estimation: the simulation breaks down a small step beside the current parameters. "
                 "Start from stiffer tissue (estimation.start), or check the grip."
             )
@@ -67,7 +67,7 @@ def gauss_newton(
 
     r = residual(x, 0)
     if r is None:
-        raise Problem(
+        raise Breakdown(
             "estimation: the simulation breaks down at its start values. "
             "Start from stiffer tissue (estimation.start), or check the grip."
         )

@@ -94,17 +94,36 @@ def choose_start(trial: Trial, history: list, say: Say) -> np.ndarray:
     for x, cost in zip(points, costs, strict=True):
         history.append({"round": "start", "cost": number(cost)} | plain(wanted, x))
     if not np.isfinite(costs).any():
-        raise Problem(
+        raise Breakdown(
             "estimation: the body turns inside out under the recorded motion at every start. Check the grip and its "
             "path (tracking), or start from other values (estimation.start)."
         )
     return points[int(np.argmin(costs))]
 
 
+def search_softly(
+    trial: Trial, phase: np.ndarray, settings: Estimation, history: list, say: Say
+) -> tuple[Trial, Solution]:
+    """Start and descent, with a softer grip each time the search leaves where the clip can be simulated."""
+    while True:
+        try:
+            return trial, descend(trial, choose_start(trial, history, say), phase, settings, history, say)
+        except Breakdown as breakdown:
+            softer = [g for g in GRIPS if g < trial.grip]
+            if not softer:
+                raise
+            history.append({"round": "grip", "share": trial.grip, "cost": None, "broke": str(breakdown)})
+            trial = replace(trial, grip=softer[0])
+
+
 def descend(trial: Trial, x: np.ndarray, phase: np.ndarray, settings: Estimation, history: list, say: Say) -> Solution:
     """Gauss-Newton over growing windows from x."""
-    wanted, ends = trial.wanted, windows(trial.fitted, phase, settings.first_window)
+    wanted, ends, start = trial.wanted, windows(trial.fitted, phase, settings.first_window), x
     for k, last in enumerate(ends):
+        # What fits a window may turn the tissue inside out in the next; the start survived the whole clip.
+        if k and trial.residual(x, last=last) is None:
+            history.append({"round": k, "last_frame": int(last), "cost": None} | plain(wanted, x))
+            x = start
 
         def said(iteration, x, cost, k=k, last=last):
             values = {n: float(f"{v:.4g}") for n, v in plain(wanted, x).items()}
