@@ -1,6 +1,19 @@
-"""What every test shares: threads that wait their turn instead of spinning for it."""
+"""What tests of several rooms use."""
 
 import os
+from pathlib import Path
 
-# Before torch is imported anywhere: on a busy machine its idle threads would keep both cores from working.
+import pytest
+
+# Before torch is imported anywhere: on a busy machine its idle threads, spinning, would keep both cores from working.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+
+SHARED = Path(__file__).parents[2] / "shared"
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """Recordings and weights beside the project; a test that needs them is skipped where they are not."""
+    if not SHARED.is_dir():
+        pytest.skip(f"NO SHARED DATA: {SHARED} is not there, so this test did not run.")
+    return SHARED
