@@ -4,6 +4,7 @@ import contextlib
 import fcntl
 import json
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -112,16 +113,20 @@ def _follow(child: subprocess.Popen, state: State, out: Path, show: Any, debug: 
     streams = {s: b"" for s in (child.stdout, child.stderr) if s}
     for stream in streams:
         os.set_blocking(stream.fileno(), False)
+    shown = 0.0
     while True:
         over = child.poll() is not None
         for stream in streams:
             *lines, streams[stream] = (streams[stream] + (stream.read() or b"")).split(b"\n")
             for line in lines:
                 _hear(line.decode(errors="replace"), state, out, debug)
-        show(state)
+        if over or time.monotonic() - shown > 0.25:
+            show(state)
+            shown = time.monotonic()
         if over:
             return
-        time.sleep(0.25)
+        # Not a plain sleep: a large plan fills the pipe many times over, and Snakemake would wait for each emptying.
+        select.select(list(streams), [], [], 0.25)
 
 
 def _hear(line: str, state: State, out: Path, debug: bool) -> None:
