@@ -10,6 +10,8 @@ from surgisim.problem import Problem
 
 PRIOR_LOG = 1.5
 """Standard deviation of the prior on a logarithm: tissue moduli spread over a factor 4-5 either way."""
+REACH = 2.0
+"""How many prior deviations from its start a logarithm may go."""
 FIRST_STEPS, SECOND_STEPS = (-2.4, -1.6, -0.8, 0.0, 0.8), (-1.2, 0.0, 1.2)
 """Offsets of the first two logarithms in the scan that precedes the descent."""
 PRIOR_SHARE = 0.3
@@ -41,9 +43,16 @@ class Search:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest x: each law's own range, and for logarithms at most REACH prior deviations from the start.
+
+        Where a clip cannot tell a modulus, the descent would wander to the end of its range, and a hundred times
+        stiffer tissue costs ten times the steps.
+        """
         ends = [(_forward(p, p.low), _forward(p, p.high)) for *_, p in self.free]
         low, high = np.array(ends).reshape(-1, 2).T
-        return low, high
+        logarithmic = np.array([p.logarithmic for *_, p in self.free], bool)
+        reach = np.where(logarithmic, REACH * self.spread, np.inf)
+        return np.maximum(low, self.start - reach), np.minimum(high, self.start + reach)
 
     def starts(self) -> list[np.ndarray]:
         """Points to try first: the start, and up to two logarithms stepped around it."""
