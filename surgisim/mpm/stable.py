@@ -15,8 +15,8 @@ def wave_speed(terms: dict[str, Term], values: dict[str, dict[str, float]], dens
 def largest_step(terms: dict[str, Term], values: dict[str, dict[str, float]], density: float, spacing: float) -> float:
     """Largest stable step [s]: 1 / (2 c / dx + 2 eta / (rho dx^2)).
 
-    The wave speed alone is not enough once viscosity grows; the bound was found stable over E/rho
-    25-400 and eta/rho up to 0.2 (docs/verification.md).
+    The wave speed alone is not enough once viscosity grows: the second part is the explicit limit of
+    diffusion over one cell, halved as the first is.
     """
     viscosity = sum(t.viscosity(**values[n]) for n, t in terms.items() if t.viscosity)
     rate = 2 * wave_speed(terms, values, density) / spacing + 2 * viscosity / (density * spacing**2)
