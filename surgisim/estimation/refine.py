@@ -80,7 +80,7 @@ def refine(
             best_s, best_judged = s.copy(), judged
         if k == iterations:
             break
-        gradient = simulator.gradient(now, drive, run, u_bar)[:, columns] * now[:, columns]
+        gradient = simulator.gradient(now, drive, run, u_bar).theta[:, columns] * now[:, columns]
         difference = s[own] - s[other]
         smooth = np.zeros_like(s)
         for c in range(s.shape[1]):

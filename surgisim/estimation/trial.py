@@ -38,7 +38,9 @@ class Trial:
 
     def drive(self, values: Values, *, frames: int | None = None, safety: float = SAFETY, stiffest=None) -> Drive:
         """The clip's motion at a step that is stable for `stiffest` (or `values`)."""
-        per_frame = self.bodies[0].per_frame(stiffest or values, self.fps, safety)
+        body = self.bodies[0]
+        rows = stiffest or body.stiffest(body.theta(values))
+        per_frame = body.per_frame_of(rows, self.fps, safety)
         return self.bodies[0].drive(
             self.motion, values, fps=self.fps, per_frame=per_frame, frames=frames or self.frames, held=self.held,
             grip=self.grip,

@@ -22,18 +22,22 @@ class Drive:
     """Bit a is set where anchor a holds the particle, (P,) int32."""
     path: np.ndarray
     """Displacement of each anchor at every step and after the last [m], (1 + J, S + 1, 3)."""
-    active: np.ndarray
-    """Whether the anchor holds during each step, (1 + J, S) bool."""
+    hold: np.ndarray
+    """Share of its spring with which each anchor holds during each step, 0 where it has let go, (1 + J, S)."""
     step: float
     """[s]"""
     per_frame: int
     """Steps between two frames."""
     stiffness: np.ndarray
-    """Spring that holds a particle to each anchor, per unit of mass [1/s^2], (1 + J,)."""
+    """Spring that holds a particle to each anchor, per unit of mass [1/s^2], (1 + J, 3, 3)."""
+    center: np.ndarray
+    """What each anchor turns about, at rest [m], (1 + J, 3)."""
+    turn: np.ndarray | None = None
+    """Rotation of each anchor at every step, (1 + J, S + 1, 3, 3); None where none turns."""
 
     @property
     def steps(self) -> int:
-        return self.active.shape[1]
+        return self.hold.shape[1]
 
     @property
     def frames(self) -> int:
@@ -87,4 +91,6 @@ def drive(
         frame = np.minimum(np.arange(steps) // per_frame, len(on) - 1)
         active[1 + j] = on[frame] & on[np.minimum(frame + 1, len(on) - 1)]
     springs = stiffness * np.concatenate([[1.0], np.full(grips, grip)])
-    return Drive(member, path, active, step, per_frame, springs)
+    center = np.concatenate([rest[held].mean(0, keepdims=True) if held.any() else np.zeros((1, 3)), motion.center_rest])
+    spring = springs[:, None, None] * np.eye(3)
+    return Drive(member, path, active.astype(float), step, per_frame, spring, center)

@@ -1,7 +1,8 @@
 """From artifacts to a body ready to run."""
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,10 +15,12 @@ from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import ANCHOR, Drive, drive
 from surgisim.mpm.simulator import Simulator
 from surgisim.mpm.stable import check_step, largest_step, wave_speed
-from surgisim.physics.catalogue import Term, choose, columns
+from surgisim.physics.catalogue import Numbers, Term, choose, columns, defaults
+from surgisim.physics.place import Place, rows
 from surgisim.problem import Problem
 
-Values = dict[str, dict[str, float]]
+Values = dict[str, Numbers]
+"""Law -> parameter -> value."""
 
 LEAST_GRIP = 1.0
 """Smallest radius of a grip, in cells."""
@@ -32,19 +35,25 @@ class Prepared:
     density: float
     """[kg/m^3]"""
     body: Body
+    places: Mapping[str, Place] = field(default_factory=dict)
+    """Laws that act in one place only."""
 
-    def theta(self, values: Values) -> np.ndarray:
-        """One number a parameter as one row a particle, (P, M)."""
-        row = [values[name][param] for name, term in choose(self.terms).items() for param in term.params]
-        return np.tile(np.array(row, float), (self.simulator.count, 1))
+    def theta(self, values: Values, places: Mapping[str, Place] | None = None) -> np.ndarray:
+        """The laws' columns, one row a particle, (P, M)."""
+        places = self.places if places is None else places
+        return rows(choose(self.terms), values, places, self.simulator.rest, self.simulator.volume_p)
 
     def stiffest(self, theta: np.ndarray) -> Values:
-        """The largest value of every parameter on any particle: what bounds the step."""
-        return _largest(choose(self.terms), theta)
+        """The largest value of every column on any particle: what bounds the step."""
+        return largest_rows(choose(self.terms), theta)
 
     def per_frame(self, values: Values, fps: float, safety: float = 1.0) -> int:
         """Steps between two frames so that the run is stable."""
-        largest = largest_step(choose(self.terms), values, self.density, self.simulator.grid.spacing)
+        return self.per_frame_of(self.stiffest(self.theta(values)), fps, safety)
+
+    def per_frame_of(self, rows: Values, fps: float, safety: float = 1.0) -> int:
+        """The same for the largest columns, as `stiffest` gives them."""
+        largest = largest_step(choose(self.terms), rows, self.density, self.simulator.grid.spacing)
         return max(1, math.ceil(1 / fps / (largest * safety)))
 
     def drive(
@@ -64,13 +73,19 @@ class Prepared:
         the tissue slip out of it.
         """
         spacing = self.simulator.grid.spacing
-        rate = wave_speed(choose(self.terms), values, self.density) / spacing
+        laws = choose(self.terms)
+        base = {n: t.row(values[n]) for n, t in laws.items() if t.energy is not None}
+        rate = wave_speed({n: laws[n] for n in base}, base, self.density) / spacing
         motion = replace(motion, radius=np.maximum(motion.radius, LEAST_GRIP * spacing))
         held = self.body.held if held is None else held
         spring = ANCHOR * rate**2
-        return drive(
+        path = drive(
             motion, self.body.rest, held, fps=fps, per_frame=per_frame, frames=frames, stiffness=spring, grip=grip
         )
+        for name, term in laws.items():
+            if term.drive is not None:
+                path = term.drive(path, **values[name])
+        return path
 
 
 def prepare(
@@ -81,7 +96,9 @@ def prepare(
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     carried: np.ndarray | None = None,
     cut: Cut | None = None,
+    places: Mapping[str, Place] | None = None,
     device: str = "cpu",
+    precision: str = "single",
 ) -> Prepared:
     """Lay the grid around the body and every further rest point it has to carry [m], (Q, 3)."""
     points = body.rest if carried is None else np.concatenate([body.rest, carried])
@@ -94,8 +111,9 @@ def prepare(
         gravity=gravity,
         cut=cut,
         device=device,
+        precision=precision,
     )
-    return Prepared(simulator, tuple(terms), density, body)
+    return Prepared(simulator, tuple(terms), density, body, places or {})
 
 
 def values_of(physics: Physics) -> Values:
@@ -120,11 +138,12 @@ def checked_per_frame(physics: Physics, material: Material, fps: float) -> int:
     """Steps a frame for the step that travels with the parameters; refuses one too large for them."""
     terms = choose(physics.terms, "physics.json")
     theta = theta_of(physics, material)
-    largest = largest_step(terms, _largest(terms, theta), physics.density, physics.grid["spacing"])
+    largest = largest_step(terms, largest_rows(terms, theta), physics.density, physics.grid["spacing"])
     check_step(physics.grid["step"], largest, "physics.json, grid.step")
     return max(1, round(1 / fps / physics.grid["step"]))
 
 
-def _largest(terms: dict[str, Term], theta: np.ndarray) -> Values:
-    top = dict(zip(columns(terms), theta.max(0).tolist(), strict=True))
-    return {law: {p: top[f"{law}.{p}"] for p in term.params} for law, term in terms.items()}
+def largest_rows(terms: Mapping[str, Term], theta: np.ndarray) -> Values:
+    """Law -> column -> its largest value on any particle, from theta (P, M)."""
+    top = dict(zip(columns(terms), theta.max(0).tolist() if theta.size else [], strict=True))
+    return {law: {c: top[f"{law}.{c}"] for c in term.row(defaults(term))} for law, term in terms.items()}

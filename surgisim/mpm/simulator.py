@@ -1,35 +1,32 @@
 """Runs of one body: forward, and back through every step.
 
-Memory of a backward run: one state a frame plus one state a step of a single frame. The segment
-between two frames is computed again before it is walked back, so an adjoint costs one extra
-forward and no more memory however long the clip.
+Memory of a backward run: one state a frame, plus the states of one stretch of steps. A stretch is computed again
+before it is walked back, so an adjoint costs one extra forward however long the clip; a frame too long for the
+memory allowed is walked in several stretches.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
-from scipy import sparse
 
+from surgisim.mpm.culprit import culprit
 from surgisim.mpm.cut import Cut
-from surgisim.mpm.extension import extension
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
-from surgisim.mpm.kernels import (
-    Anchors,
-    node_adjoint_before,
-    node_adjoint_gather,
-    node_gather,
-    node_step,
-    particle_kernels,
-    tick,
-)
+from surgisim.mpm.kernels import node_kernels, particle_kernels, shapes, tick
+from surgisim.mpm.nodes import Nodes
+from surgisim.physics.catalogue import choose, columns
 from surgisim.problem import Problem
 
 wp.config.log_level = wp.LOG_WARNING
 
 NEVER = 2**31 - 1
+
+State = tuple[np.ndarray, ...]
+"""u, v over solid nodes, (A, 3) each, and, where a law has memory, q, (P, S)."""
 
 
 class Breakdown(Problem):
@@ -41,12 +38,31 @@ class Run:
     """What a forward run leaves: enough to draw it, to judge it and to walk it back."""
 
     u: np.ndarray
-    """Nodal displacement at every frame [m], (T, A, 3) float32, over solid nodes."""
+    """Nodal displacement at every frame [m], (T, A, 3), over solid nodes."""
     v: np.ndarray
-    """Nodal velocity at every frame [m/s], (T, A, 3) float32."""
+    """Nodal velocity at every frame [m/s], (T, A, 3)."""
+    q: np.ndarray
+    """What the laws remember at every frame, (T, P, S); S is 0 where nothing is remembered."""
+
+    def state(self, t: int) -> State:
+        return self.u[t], self.v[t], self.q[t]
 
 
-class Simulator:
+@dataclass(frozen=True)
+class Gradient:
+    """Derivative of a loss with respect to everything a run starts from."""
+
+    theta: np.ndarray
+    """By the laws' columns, (P, M)."""
+    path: np.ndarray
+    """By the anchors' path at every step [1/m], (1 + J, S + 1, 3)."""
+    u: np.ndarray
+    """By the first displacement [1/m], (A, 3)."""
+    v: np.ndarray
+    """By the first velocity [s/m], (A, 3)."""
+
+
+class Simulator(Nodes):
     """A body on its grid, ready to run. One instance per thread: it owns its device arrays."""
 
     def __init__(
@@ -60,38 +76,42 @@ class Simulator:
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         cut: Cut | None = None,
         device: str = "cpu",
+        precision: str = "single",
     ) -> None:
-        """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,)."""
-        self.rest, self.grid, self.terms, self.device = np.asarray(rest, float), grid, tuple(terms), device
-        self.count, self.cut = len(rest), cut
-        nodes, weight, _ = self.stencil(self.rest)
-        mass_p = volume.astype(float) * density
-        sides = 1 if cut is None else 2
-        mass = np.bincount(nodes.ravel(), (weight * mass_p[:, None]).ravel(), sides * grid.count)
-        self.place, self.rule = extension(grid, mass, cut)
+        """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,); precision is 'single' or 'double'."""
+        self.rest, self.terms, self.device, self.density = np.asarray(rest, float), tuple(terms), device, float(density)
+        self.count, self.volume_p, self.precision = len(rest), np.asarray(volume, float), precision
+        super().__init__(grid, self.rest, self.volume_p, cut)
+        self.types = shapes(precision)
+        self.real = np.float32 if precision == "single" else np.float64
         local, links = self.links(self.rest)
-        mass = np.bincount(local.ravel(), (links[..., 0] * mass_p[:, None]).ravel(), len(self.place))
+        self._local, self._weight = local, links[..., 0]
         order = np.argsort(local.ravel(), kind="stable").astype(np.int32)
         start = np.searchsorted(local.ravel()[order], np.arange(len(self.place) + 1)).astype(np.int32)
-
-        def put(array, dtype):
-            return wp.array(np.ascontiguousarray(array), dtype=dtype, device=device)
-
-        self.index, self.link = put(local, int), put(links.astype(np.float32), wp.vec4)
-        self.start, self.entry = put(start, int), put(order, int)
-        self.volume, self.mass_p = put(volume.astype(np.float32), float), put(mass_p.astype(np.float32), float)
-        self.mass = put(mass.astype(np.float32), float)
-        self.gravity = wp.vec3(*gravity)
-        self.stress = wp.zeros(self.count, dtype=wp.mat33, device=device)
-        self.push = wp.zeros(self.count, dtype=wp.vec3, device=device)
-        self.clock = wp.zeros(2, dtype=int, device=device)
-        self.trouble = put(np.array([NEVER, 0]), int)
-        self.force = wp.zeros(len(self.place), dtype=wp.vec3, device=device)
+        s = self.types
+        self.index, self.link = self._put(local, int), self._put(links, s.Link)
+        self.start, self.entry = self._put(start, int), self._put(order, int)
+        self.volume, self.rest_d = self._put(self.volume_p, s.real), self._put(self.rest, s.Vec)
+        self.gravity = s.Vec(*gravity)
         self.scatter = not wp.get_device(device).is_cuda
-        self.kernels = particle_kernels(self.terms, self.scatter)
+        self.nodes = node_kernels(precision)
+        self.kernels = particle_kernels(self.terms, self.scatter, precision)
+        self.width = self.kernels.memory
+        self.mass = self._put(self.node_mass(np.full(self.count, self.density)), s.real)
+        per_particle = 1 if self.scatter else self.count
+        self.stress = wp.zeros(per_particle, dtype=s.Mat, device=device)
+        self.push = wp.zeros(per_particle, dtype=s.Vec, device=device)
+        self.clock = wp.zeros(2, dtype=int, device=device)
+        self.trouble = self._put(np.array([NEVER, 0]), int)
+        self.force = wp.zeros(len(self.place), dtype=s.Vec, device=device)
         # Loaded here, once: two threads that load one module at their first launch crash the process.
-        for kernel in (self.kernels.step, self.kernels.adjoint, node_step):
+        for kernel in (self.kernels.step, self.kernels.adjoint, *vars(self.nodes).values(), tick):
             wp.load_module(kernel.module, device=device)
+
+    def node_mass(self, density: np.ndarray) -> np.ndarray:
+        """Mass of the solid nodes [kg], (A,), for a density at every particle [kg/m^3], (P,)."""
+        share = self._weight * (self.volume_p * density)[:, None]
+        return np.bincount(self._local.ravel(), share.ravel(), len(self.place))
 
     # Forward
 
@@ -100,185 +120,227 @@ class Simulator:
         theta: np.ndarray,
         drive: Drive,
         *,
-        begin: tuple[np.ndarray, np.ndarray] | None = None,
+        begin: State | None = None,
         first: int = 0,
         last: int | None = None,
         progress: Callable[[float, float, str], None] | None = None,
     ) -> Run:
-        """Frames `first` to `last` of the drive, from state `begin` (u, v over solid nodes; rest if None).
+        """Frames `first` to `last` of the drive, from state `begin` (rest if None; memory empty if not given).
 
-        theta: parameters, one row a particle, (P, M). Raises Problem where a particle inverts or a
-        number stops being finite, naming step and particle.
+        theta: the laws' columns, one row a particle, (P, M). Raises Breakdown where a particle inverts or a
+        number stops being finite, naming step, particle and law.
         """
         last = drive.frames - 1 if last is None else last
-        anchors, theta_d = self._anchors(drive), self._theta(theta)
-        u, v = self._slots(2)
-        if begin is not None:
-            u[0].assign(begin[0])
-            v[0].assign(begin[1])
-        self._reset(first * drive.per_frame)
-        us, vs = [u.numpy()[0].copy()], [v.numpy()[0].copy()]
-        commands = self._commands(theta_d, anchors, drive.step, 2, u, v)
+        task = self._task(theta, drive, 2)
+        self._load(task, begin or (), first * drive.per_frame)
+        states = [self._state(task, 0)]
         for frame in range(first, last):
-            self._advance(commands, drive.per_frame)
-            slot = (frame + 1 - first) * drive.per_frame % 2
-            us.append(u.numpy()[slot].copy())
-            vs.append(v.numpy()[slot].copy())
-            self._check(us[-1], drive, frame)
+            self._advance(task.forward, drive.per_frame)
+            states.append(self._state(task, (frame + 1 - first) * drive.per_frame % 2))
+            self._check(states, theta, drive, frame)
             if progress:
                 progress(frame + 1 - first, last - first, f"frame {frame + 1}/{drive.frames - 1}")
-        return Run(np.stack(us), np.stack(vs))
+        return Run(*(np.stack(part) for part in zip(*states, strict=True)))
 
     # Backward
 
-    def gradient(self, theta: np.ndarray, drive: Drive, run: Run, u_bar: np.ndarray, *, first: int = 0) -> np.ndarray:
-        """Derivative of a loss with respect to theta, (P, M), given its derivative `u_bar` (T, A, 3) by `run.u`."""
-        anchors, theta_d = self._anchors(drive), self._theta(theta)
+    def gradient(
+        self, theta: np.ndarray, drive: Drive, run: Run, u_bar: np.ndarray, *, first: int = 0, memory_mb: float = 512.0
+    ) -> Gradient:
+        """Derivative of a loss, given its derivative `u_bar` (T, A, 3) by `run.u`.
+
+        memory_mb: what the states of a stretch may take; raises Problem if that is too little for one frame.
+        """
         per = drive.per_frame
-        u, v = self._slots(per + 1)
-        forward = self._commands(theta_d, anchors, drive.step, per + 1, u, v)
-        ub, vb = (wp.zeros(len(self.place), dtype=wp.vec3, device=self.device) for _ in range(2))
-        theta_bar = wp.zeros_like(theta_d)
-        backward = self._adjoint_commands(theta_d, anchors, drive.step, per + 1, u, v, ub, vb, theta_bar)
-        ub.assign(u_bar[-1].astype(np.float32))
+        stretch = self._stretch(per, memory_mb)
+        task = self._task(theta, drive, stretch + 1)
+        back = self._back(task, drive)
+        back.u.assign(u_bar[-1].astype(self.real))
         for frame in range(len(run.u) - 1, 0, -1):
-            if not (ub.numpy().any() or vb.numpy().any()):
-                ub.assign(u_bar[frame - 1].astype(np.float32))
-                continue
-            u[0].assign(run.u[frame - 1])
-            v[0].assign(run.v[frame - 1])
-            self._reset((first + frame - 1) * per)
-            self._advance(forward, per)
-            for _ in range(per):
-                for command in backward:
-                    command.launch()
-            total = ub.numpy() + u_bar[frame - 1]
+            if back.u.numpy().any() or back.v.numpy().any() or back.q.numpy().any():
+                self._walk_back(task, back, run.state(frame - 1), (first + frame - 1) * per, per, stretch)
+            total = back.u.numpy() + u_bar[frame - 1]
             if not np.isfinite(total).all():
                 raise Problem(
                     f"adjoint: a derivative is not finite at frame {first + frame - 1}. "
                     "The run is unstable there: take a smaller step."
                 )
-            ub.assign(total.astype(np.float32))
-        return theta_bar.numpy().astype(float)
+            back.u.assign(total.astype(self.real))
+        return Gradient(self._theta_bar(back), *(a.numpy().astype(float) for a in (back.path, back.u, back.v)))
 
-    def stencil(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """As Grid.stencil; a link across the cut leads to the node's copy on the point's own side, N further on."""
-        nodes, weight, gradient = self.grid.stencil(points)
-        if self.cut is not None:
-            across = self.cut.crosses(points[:, None], self.grid.positions()[nodes])
-            nodes = nodes + across.astype(np.int32) * self.grid.count
-        return nodes, weight, gradient
+    def _walk_back(self, task: "_Task", back: "_Back", state: State, step: int, count: int, stretch: int) -> None:
+        """Back over `count` steps that began at `step` in `state`."""
+        starts = [state]
+        self._load(task, state, step)
+        for _ in range(math.ceil(count / stretch) - 1):
+            self._advance(task.forward, stretch)
+            starts.append(self._state(task, stretch))
+            self._load(task, starts[-1], step + (len(starts) - 1) * stretch)
+        for k in reversed(range(len(starts))):
+            length = min(stretch, count - k * stretch)
+            self._load(task, starts[k], step + k * stretch)
+            self._advance(task.forward, length)
+            self._advance(back.commands, length)
 
-    def links(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Solid nodes (Q, L) that carry points [m], (Q, 3), with weight and its gradient [1, 1/m], (Q, L, 4).
+    def _stretch(self, per: int, memory_mb: float) -> int:
+        """Steps that are recorded at once, so that their states and the starts of the other stretches fit."""
+        size = np.dtype(self.real).itemsize
+        state = size * (6 * len(self.place) + self.width * self.count) / 2**20
+        allowed = int(memory_mb / state)
+        if per + 1 <= allowed:
+            return per
+        stretch = allowed // 2
+        if stretch < 1 or math.ceil(per / stretch) + stretch + 1 > allowed:
+            least = 2 * (math.isqrt(per) + 2) * state
+            raise Problem(
+                f"adjoint: {memory_mb:.1f} MB hold {allowed} states, too few for the {per} steps of a frame. "
+                f"Allow at least {least:.0f} MB."
+            )
+        return stretch
 
-        Rows shorter than the longest are padded with links of weight zero to their first node.
-        """
-        nodes, weight, gradient = self.stencil(points)
-        rows = np.repeat(np.arange(len(nodes)), 27)
-        size = (len(nodes), self.rule.shape[0])
-        parts = [
-            (sparse.csr_matrix((values.ravel(), (rows, nodes.ravel())), size) @ self.rule).tocsr()
-            for values in (weight, *np.moveaxis(gradient, -1, 0))
-        ]
-        # One pattern for the four: where one of them happens to be zero, the others need not be.
-        pattern = sum(abs(p) for p in parts).tocsr()
-        pattern.sort_indices()
-        lengths = np.diff(pattern.indptr)
-        row = np.repeat(np.arange(len(nodes)), lengths)
-        column = np.arange(pattern.nnz) - np.repeat(pattern.indptr[:-1], lengths)
-        index = np.zeros((len(nodes), max(1, int(lengths.max(initial=1)))), np.int32)
-        first = np.where(lengths > 0, pattern.indices[np.minimum(pattern.indptr[:-1], max(pattern.nnz - 1, 0))], 0)
-        index[:] = first[:, None]
-        index[row, column] = pattern.indices
-        link = np.zeros((*index.shape, 4))
-        for k, part in enumerate(parts):
-            link[row, column, k] = np.asarray(part[row, pattern.indices]).ravel()
-        return index, link
-
-    def carry(self, points: np.ndarray) -> sparse.csr_matrix:
-        """Interpolation from solid nodes to points [m], (Q, 3), (Q, A); rows far from the body sum to less than 1."""
-        index, link = self.links(points)
-        rows = np.repeat(np.arange(len(index)), index.shape[1])
-        return sparse.csr_matrix((link[..., 0].ravel(), (rows, index.ravel())), (len(index), len(self.place)))
-
-    def displaced(self, u: np.ndarray) -> np.ndarray:
-        """Nodal displacement [m], (..., N, 3) or (..., 2 N, 3) once cut, of every node that follows the body."""
-        flat = np.moveaxis(u.astype(float), -2, 0).reshape(len(self.place), -1)
-        return np.moveaxis((self.rule @ flat).reshape(-1, *u.shape[:-2], 3), 0, -2)
-
-    def inherited(self, other: "Simulator", u: np.ndarray) -> np.ndarray:
-        """Nodal values of `other`, (A', 3), over this simulator's nodes, (A, 3): both copies start as the node did."""
-        return other.displaced(u)[self.place % self.grid.count].astype(np.float32)
+    def _theta_bar(self, back: "_Back") -> np.ndarray:
+        theta_bar = back.theta.numpy().astype(float)
+        laws = choose(self.terms)
+        heavy = [columns(laws).index(f"{n}.{laws[n].mass}") for n in self.kernels.laws.mass]
+        if heavy:
+            # The density acts through the nodes' mass and through forces that are proportional to it.
+            through = (self._weight * back.mass.numpy()[self._local]).sum(1) * self.volume_p
+            theta_bar[:, heavy] += (through + back.rho.numpy())[:, None]
+        return theta_bar
 
     # Parts
 
-    def _slots(self, count: int):
-        shape = (count, len(self.place))
-        return tuple(wp.zeros(shape, dtype=wp.vec3, device=self.device) for _ in range(2))
+    def _put(self, array: np.ndarray, dtype):
+        kind = np.int32 if dtype is int else self.real
+        return wp.array(np.ascontiguousarray(array, kind), dtype=dtype, device=self.device)
 
-    def _theta(self, theta: np.ndarray):
-        theta = np.ascontiguousarray(theta, np.float32)
+    def _zeros(self, shape, dtype):
+        return wp.zeros(shape, dtype=dtype, device=self.device)
+
+    def _task(self, theta: np.ndarray, drive: Drive, slots: int) -> "_Task":
+        """Device arrays and recorded launches of one run."""
+        theta = np.asarray(theta)
         if theta.shape != (self.count, self.kernels.columns):
             raise Problem(f"theta is {theta.shape}, but ({self.count}, {self.kernels.columns}) is wanted.")
-        return wp.array(theta, dtype=float, device=self.device)
+        s, laws = self.types, choose(self.terms)
+        density = np.full(self.count, self.density)
+        for name in self.kernels.laws.mass:
+            density = density + theta[:, columns(laws).index(f"{name}.{laws[name].mass}")]
+        if self.kernels.laws.mass:
+            self.mass.assign(self.node_mass(density).astype(self.real))
+        u, v = (self._zeros((slots, len(self.place)), s.Vec) for _ in range(2))
+        q = self._zeros((slots, self.count if self.width else 1), self.kernels.laws.Memory)
+        inputs = [
+            self.clock, self.index, self.link, self.volume, self._put(density, s.real), self.rest_d,
+            self._put(theta, s.real), self._anchors(drive), s.real(drive.step), slots, u, v, q,
+        ]  # fmt: skip
+        launch = {"device": self.device, "record_cmd": True}
+        outs = [self.stress, self.push, self.force, self.trouble]
+        nodes = [self.clock, self.mass, self.gravity, s.real(drive.step), slots, self.force, u, v]
+        forward = [
+            wp.launch(self.kernels.step, self.count, inputs + outs, **launch),
+            wp.launch(self.nodes.step, len(self.place), nodes, **launch),
+            wp.launch(tick, 1, [self.clock, 1], **launch),
+        ]
+        if not self.scatter:
+            links = [self.start, self.entry, self.link, self.stress, self.push, self.force]
+            forward.insert(1, wp.launch(self.nodes.gather, len(self.place), links, **launch))
+        return _Task(slots, u, v, q, inputs, forward)
 
-    def _anchors(self, drive: Drive) -> Anchors:
-        anchors = Anchors()
-        anchors.member = wp.array(drive.member.astype(np.int32), dtype=int, device=self.device)
-        anchors.path = wp.array(drive.path.astype(np.float32), dtype=wp.vec3, device=self.device)
-        anchors.active = wp.array(drive.active.astype(np.int32), dtype=int, device=self.device)
-        anchors.stiffness = wp.array(drive.stiffness.astype(np.float32), dtype=float, device=self.device)
+    def _back(self, task: "_Task", drive: Drive) -> "_Back":
+        """Device arrays and recorded launches of the way back; nothing is stepped by recording them."""
+        s, heavy = self.types, bool(self.kernels.laws.mass)
+        f, u, v = (self._zeros(len(self.place), s.Vec) for _ in range(3))
+        m = self._zeros(len(self.place) if heavy else 0, s.real)
+        rho = self._zeros(self.count if heavy else 0, s.real)
+        per_particle = 1 if self.scatter else self.count
+        F, G = (self._zeros(per_particle, s.Mat) for _ in range(2))
+        x, y = (self._zeros(per_particle, s.Vec) for _ in range(2))
+        q = self._zeros(self.count if self.width else 1, self.kernels.laws.Memory)
+        theta, path = self._zeros((self.count, self.kernels.columns), s.real), self._zeros(drive.path.shape[:2], s.Vec)
+        launch = {"device": self.device, "record_cmd": True}
+        before = [self.clock, self.mass, self.gravity, s.real(drive.step), task.slots, task.v, u, v, f, m]
+        outs = [f, F, G, x, y, u, v, q, theta, rho, path]
+        commands = [
+            wp.launch(tick, 1, [self.clock, -1], **launch),
+            wp.launch(self.nodes.before, len(self.place), before, **launch),
+            wp.launch(self.kernels.adjoint, self.count, task.inputs + outs, **launch),
+        ]
+        if not self.scatter:
+            links = [self.start, self.entry, self.link, F, G, x, y, u, v]
+            commands.append(wp.launch(self.nodes.gather_back, len(self.place), links, **launch))
+        return _Back(u, v, q, theta, path, m, rho, commands)
+
+    def _anchors(self, drive: Drive):
+        s = self.types
+        anchors = s.Anchors()
+        anchors.member = self._put(drive.member, int)
+        anchors.path, anchors.hold = self._put(drive.path, s.Vec), self._put(drive.hold, s.real)
+        anchors.turning = int(drive.turn is not None)
+        turn = np.zeros((1, 1, 3, 3)) if drive.turn is None else drive.turn
+        anchors.turn, anchors.center = self._put(turn, s.Mat), self._put(drive.center, s.Vec)
+        anchors.stiffness = self._put(drive.stiffness * self.density, s.Mat)
         return anchors
 
-    def _reset(self, step: int) -> None:
+    def _load(self, task: "_Task", state: State, step: int) -> None:
+        """Put a state into the first slot; what it does not hold is zero."""
+        for k, array in enumerate((task.u, task.v, task.q)):
+            if k < len(state) and state[k].size:
+                array[0].assign(np.ascontiguousarray(state[k], self.real))
+            else:
+                array[0].zero_()
         self.clock.assign(np.array([0, step], np.int32))
         self.trouble.assign(np.array([NEVER, 0], np.int32))
 
-    def _particles(self, kernel, theta, anchors, slots, u, v, rest):
-        common = [self.clock, self.index, self.link, self.volume, self.mass_p, theta, anchors, slots, u, v]
-        return wp.launch(kernel, self.count, common + rest, device=self.device, record_cmd=True)
-
-    def _commands(self, theta, anchors, dt, slots, u, v):
-        launch = {"device": self.device, "record_cmd": True}
-        outs = [self.stress, self.push, self.force, self.trouble]
-        particles = self._particles(self.kernels.step, theta, anchors, slots, u, v, outs)
-        nodes = [self.clock, self.mass, self.gravity, dt, slots, self.force, u, v]
-        step = wp.launch(node_step, len(self.place), nodes, **launch)
-        forward = wp.launch(tick, 1, [self.clock, 1], **launch)
-        if self.scatter:
-            return [particles, step, forward]
-        links = [self.start, self.entry, self.link, self.stress, self.push, self.force]
-        return [particles, wp.launch(node_gather, len(self.place), links, **launch), step, forward]
-
-    def _adjoint_commands(self, theta, anchors, dt, slots, u, v, ub, vb, theta_bar):
-        launch = {"device": self.device, "record_cmd": True}
-        fb, xb = (wp.zeros(n, dtype=wp.vec3, device=self.device) for n in (len(self.place), self.count))
-        Fb, Gb = (wp.zeros(self.count, dtype=wp.mat33, device=self.device) for _ in range(2))
-        backward = wp.launch(tick, 1, [self.clock, -1], **launch)
-        before = wp.launch(node_adjoint_before, len(self.place), [self.mass, dt, ub, vb, fb], **launch)
-        outs = [fb, Fb, Gb, xb, ub, vb, theta_bar]
-        particles = self._particles(self.kernels.adjoint, theta, anchors, slots, u, v, outs)
-        if self.scatter:
-            return [backward, before, particles]
-        links = [self.start, self.entry, self.link, Fb, Gb, xb, ub, vb]
-        return [backward, before, particles, wp.launch(node_adjoint_gather, len(self.place), links, **launch)]
+    def _state(self, task: "_Task", slot: int) -> State:
+        u, v, q = (array[slot].numpy().copy() for array in (task.u, task.v, task.q))
+        return u, v, q if self.width else np.zeros((self.count, 0), self.real)
 
     def _advance(self, commands, steps: int) -> None:
         for _ in range(steps):
             for command in commands:
                 command.launch()
 
-    def _check(self, u: np.ndarray, drive: Drive, frame: int) -> None:
+    def _check(self, states: list[State], theta: np.ndarray, drive: Drive, frame: int) -> None:
+        """Stop where the last frame went wrong, and say where, when and by which law."""
         step, particle = self.trouble.numpy()
-        if step != NEVER:
-            where = np.round(self.rest[particle], 4).tolist()
-            raise Breakdown(
-                f"simulation: particle {particle} at rest position {where} m turned inside out (or stopped being a "
-                f"number) at step {step} ({step * drive.step:.4f} s). Its load is too violent for this tissue or the "
-                "step too large: take a smaller step, a gentler motion, or a stiffer tissue."
-            )
-        if not np.isfinite(u).all():
+        if step == NEVER and np.isfinite(states[-1][0]).all():
+            return
+        if step == NEVER:
             raise Breakdown(
                 f"simulation: a displacement is not finite between frames {frame} and {frame + 1}. Take a smaller step."
             )
+        task = self._task(theta, drive, 2)
+        self._load(task, states[-2], frame * drive.per_frame)
+        self._advance(task.forward, max(0, int(step) - frame * drive.per_frame - 1))
+        law = culprit(
+            self, theta, self._state(task, max(0, int(step) - frame * drive.per_frame - 1) % 2), int(particle)
+        )
+        where = np.round(self.rest[particle], 4).tolist()
+        raise Breakdown(
+            f"simulation: particle {particle} at rest position {where} m turned inside out (or stopped being a "
+            f"number) at step {step} ({step * drive.step:.4f} s), where {law} pushed hardest. Its load is too violent "
+            "for this tissue or the step too large: take a smaller step, a gentler motion, or a stiffer tissue."
+        )
+
+
+@dataclass(frozen=True)
+class _Task:
+    slots: int
+    u: wp.array
+    v: wp.array
+    q: wp.array
+    inputs: list
+    forward: list
+
+
+@dataclass(frozen=True)
+class _Back:
+    u: wp.array
+    v: wp.array
+    q: wp.array
+    theta: wp.array
+    path: wp.array
+    mass: wp.array
+    rho: wp.array
+    commands: list

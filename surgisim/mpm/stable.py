@@ -1,25 +1,34 @@
 """The largest time step an explicit run may take."""
 
 import math
+from collections.abc import Mapping
 
-from surgisim.physics.catalogue import Term
+from surgisim.physics.catalogue import Numbers, Term
 from surgisim.problem import Problem
 
 
-def wave_speed(terms: dict[str, Term], values: dict[str, dict[str, float]], density: float) -> float:
-    """Speed of the pressure wave at rest [m/s]: sqrt((lambda + 2 mu) / rho), summed over the laws."""
-    modulus = sum(t.wave_modulus(**values[n]) for n, t in terms.items() if t.wave_modulus)
-    return math.sqrt(modulus / density)
+def wave_speed(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density: float) -> float:
+    """Speed of the pressure wave at rest [m/s]: sqrt((lambda + 2 mu) / rho), summed over the laws.
+
+    rows: every law's columns, the largest of any particle.
+    """
+    modulus = sum(t.wave_modulus(**rows[n]) for n, t in terms.items() if t.wave_modulus)
+    factor = math.prod(max(1.0, t.stiffens(**rows[n])) for n, t in terms.items() if t.stiffens)
+    return math.sqrt(factor * modulus / density)
 
 
-def largest_step(terms: dict[str, Term], values: dict[str, dict[str, float]], density: float, spacing: float) -> float:
-    """Largest stable step [s]: 1 / (2 c / dx + 2 eta / (rho dx^2)).
+def largest_step(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density: float, spacing: float) -> float:
+    """Largest stable step [s]: 1 / (2 c / dx + 2 eta / (rho dx^2) + sqrt(k / rho) / 2 + c_d / 2).
 
     The wave speed alone is not enough once viscosity grows: the second part is the explicit limit of
-    diffusion over one cell, halved as the first is.
+    diffusion over one cell, halved as the first is. Springs k [N/m^4] and dampers c_d [1/s] of body forces add theirs.
     """
-    viscosity = sum(t.viscosity(**values[n]) for n, t in terms.items() if t.viscosity)
-    rate = 2 * wave_speed(terms, values, density) / spacing + 2 * viscosity / (density * spacing**2)
+    viscosity, spring, damper = (
+        sum(slot(**rows[n]) for n, t in terms.items() if (slot := getattr(t, kind)))
+        for kind in ("viscosity", "spring", "damper")
+    )
+    rate = 2 * wave_speed(terms, rows, density) / spacing + 2 * viscosity / (density * spacing**2)
+    rate += 0.5 * math.sqrt(spring / density) + 0.5 * damper
     return 1 / rate
 
 

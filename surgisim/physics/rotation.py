@@ -18,13 +18,37 @@ def rotation(F: wp.mat33):
     return R
 
 
+@wp.func
+def rotation(F: wp.mat33d):  # noqa: F811 - Warp's own way to overload a function
+    R = F
+    for _ in range(20):
+        N = wp.float64(0.5) * (R + wp.transpose(wp.inverse(R)))
+        change = wp.ddot(N - R, N - R)
+        R = N
+        if change < wp.float64(1.0e-24):
+            break
+    return R
+
+
+# dR = R [w], (tr(S) I - S) w = vee(R^T dF - dF^T R); the transpose of that map is below. It is
+# singular only where two stretches sum to zero, which an uninverted F never reaches.
+
+
 @wp.func_grad(rotation)
 def adj_rotation(F: wp.mat33, adj_ret: wp.mat33):
-    # dR = R [w], (tr(S) I - S) w = vee(R^T dF - dF^T R); the transpose of that map is below. It is
-    # singular only where two stretches sum to zero, which an uninverted F never reaches.
     R = rotation(F)
     S = wp.transpose(R) * F
-    G = wp.trace(S) * wp.identity(n=3, dtype=float) - 0.5 * (S + wp.transpose(S))
+    G = wp.trace(S) * wp.identity(n=3, dtype=wp.float32) - 0.5 * (S + wp.transpose(S))
     B = wp.transpose(R) * adj_ret
     y = wp.inverse(G) * wp.vec3(B[2, 1] - B[1, 2], B[0, 2] - B[2, 0], B[1, 0] - B[0, 1])
+    wp.adjoint[F] += R * wp.skew(y)
+
+
+@wp.func_grad(rotation)
+def adj_rotation(F: wp.mat33d, adj_ret: wp.mat33d):  # noqa: F811
+    R = rotation(F)
+    S = wp.transpose(R) * F
+    G = wp.trace(S) * wp.identity(n=3, dtype=wp.float64) - wp.float64(0.5) * (S + wp.transpose(S))
+    B = wp.transpose(R) * adj_ret
+    y = wp.inverse(G) * wp.vec3d(B[2, 1] - B[1, 2], B[0, 2] - B[2, 0], B[1, 0] - B[0, 1])
     wp.adjoint[F] += R * wp.skew(y)

@@ -15,7 +15,7 @@ from surgisim.config.simulation import Simulation
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import Prepared, checked_per_frame, prepare, theta_of, values_of
 from surgisim.mpm.simulator import Run, Simulator
-from surgisim.physics.catalogue import choose
+from surgisim.physics.catalogue import choose, defaults
 from surgisim.problem import Problem
 from surgisim.simulation.operation import Plan, plan
 
@@ -111,7 +111,7 @@ def _march(parts: list[Simulator], theta, path: Drive, task: Plan, progress):
     states |= {t: (whole, run, t) for t in range(switch + 1)}
     if task.cut is not None and switch < last:
         opened = parts[1]
-        begin = tuple(opened.inherited(whole, a[-1]) for a in (run.u, run.v))
+        begin = (*(opened.inherited(whole, a[-1]) for a in (run.u, run.v)), run.q[-1])
         run = opened.run(theta, path, begin=begin, first=switch, last=last, progress=progress)
         states |= {switch + k: (opened, run, k) for k in range(1, last - switch + 1)}
     return states, whole
@@ -135,8 +135,9 @@ class _Look:
         self.laws = []
         column = 0
         for term in choose(physics.terms).values():
-            values = {p: theta[:, column + k] for k, p in enumerate(term.params)}
-            column += len(term.params)
+            names = list(term.row(defaults(term)))
+            values = {c: theta[:, column + k] for k, c in enumerate(names)}
+            column += len(names)
             if term.energy:
                 self.laws.append((term.energy, values))
         if settings.render:

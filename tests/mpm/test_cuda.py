@@ -19,7 +19,7 @@ def one(device):
     theta = made.theta(VALUES)
     run = made.simulator.run(theta, path)
     weight = np.random.default_rng(0).standard_normal(run.u.shape)
-    return run.u, made.simulator.gradient(theta, path, run, weight)
+    return run.u, made.simulator.gradient(theta, path, run, weight).theta
 
 
 def test_both_devices_move_the_body_alike_and_agree_on_the_gradient():

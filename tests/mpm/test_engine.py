@@ -123,7 +123,7 @@ def test_the_adjoint_is_the_slope_of_a_loss_on_all_frames():
     theta, rng = made.theta(values), np.random.default_rng(0)
     out = made.simulator.run(theta, path)
     c = rng.standard_normal(out.u.shape)
-    gradient = made.simulator.gradient(theta, path, out, c)
+    gradient = made.simulator.gradient(theta, path, out, c).theta
     for column in range(theta.shape[1]):
         along = rng.random(len(theta))[:, None] * np.eye(theta.shape[1])[column]
         h = 0.01 * theta[0, column]

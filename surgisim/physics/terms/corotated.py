@@ -7,22 +7,29 @@ R is the rotation of F, J = det F, mu = E / (2 (1 + nu)), lambda = E nu / ((1 + 
 Stomakhin, Howes, Schroeder and Teran, Energetically consistent invertible elasticity, SCA 2012.
 """
 
+from typing import Any
+
 import numpy as np
 import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
 from surgisim.physics.rotation import rotation
 
-Theta = wp.types.vector(2, float)
+
+@wp.func
+def moduli(theta: Any):
+    one, two = theta.dtype(1.0), theta.dtype(2.0)
+    mu = theta[0] / (two * (one + theta[1]))
+    lam = theta[0] * theta[1] / ((one + theta[1]) * (one - two * theta[1]))
+    return mu, lam
 
 
 @wp.func
-def stress(F: wp.mat33, D: wp.mat33, theta: Theta):
-    mu = theta[0] / (2.0 * (1.0 + theta[1]))
-    lam = theta[0] * theta[1] / ((1.0 + theta[1]) * (1.0 - 2.0 * theta[1]))
+def stress(F: Any, D: Any, theta: Any):
+    mu, lam = moduli(theta)
     J = wp.determinant(F)
-    shear = (2.0 * mu / J) * (F - rotation(F)) * wp.transpose(F)
-    return shear + lam * (J - 1.0) * wp.identity(n=3, dtype=float)
+    shear = (F.dtype(2.0) * mu / J) * (F - rotation(F)) * wp.transpose(F)
+    return shear + lam * (J - F.dtype(1.0)) * wp.identity(n=3, dtype=F.dtype)
 
 
 def lame(E: float, nu: float) -> tuple[float, float]:

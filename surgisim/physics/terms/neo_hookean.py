@@ -7,21 +7,20 @@ J = det F, mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 Bonet and Wood, Nonlinear continuum mechanics for finite element analysis, 2nd ed. (2008), section 6.4.3.
 """
 
+from typing import Any
+
 import numpy as np
 import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
-from surgisim.physics.terms.corotated import lame, wave_modulus
-
-Theta = wp.types.vector(2, float)
+from surgisim.physics.terms.corotated import lame, moduli, wave_modulus
 
 
 @wp.func
-def stress(F: wp.mat33, D: wp.mat33, theta: Theta):
-    mu = theta[0] / (2.0 * (1.0 + theta[1]))
-    lam = theta[0] * theta[1] / ((1.0 + theta[1]) * (1.0 - 2.0 * theta[1]))
+def stress(F: Any, D: Any, theta: Any):
+    mu, lam = moduli(theta)
     J = wp.determinant(F)
-    one = wp.identity(n=3, dtype=float)
+    one = wp.identity(n=3, dtype=F.dtype)
     return (mu * (F * wp.transpose(F) - one) + lam * wp.log(J) * one) / J
 
 

@@ -6,16 +6,16 @@ Beside an elastic law it makes a Kelvin-Voigt solid.
 Landau and Lifshitz, Fluid Mechanics, 2nd ed. (1987), section 15.
 """
 
+from typing import Any
+
 import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
 
-Theta = wp.types.vector(1, float)
-
 
 @wp.func
-def stress(F: wp.mat33, D: wp.mat33, theta: Theta):
-    return (2.0 * theta[0]) * D
+def stress(F: Any, D: Any, theta: Any):
+    return (F.dtype(2.0) * theta[0]) * D
 
 
 def twin(F, D, eta):

@@ -8,17 +8,17 @@ only through J^gamma, which is near 1 for nearly incompressible tissue.
 Wang et al., Realistic surgical simulation from monocular videos (SurgiSim), section 3.3.
 """
 
+from typing import Any
+
 import numpy as np
 import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
 
-Theta = wp.types.vector(2, float)
-
 
 @wp.func
-def stress(F: wp.mat33, D: wp.mat33, theta: Theta):
-    return (2.0 * theta[0] * wp.pow(wp.determinant(F), theta[1])) * D
+def stress(F: Any, D: Any, theta: Any):
+    return (F.dtype(2.0) * theta[0] * wp.pow(wp.determinant(F), theta[1])) * D
 
 
 def twin(F, D, eta, gamma):

@@ -1,0 +1,70 @@
+"""The nodes that carry a body, and how points hang on them."""
+
+import numpy as np
+from scipy import sparse
+
+from surgisim.mpm.cut import Cut
+from surgisim.mpm.extension import extension
+from surgisim.mpm.grid import Grid
+
+
+class Nodes:
+    """Solid nodes `place` (A,) of a grid, and the rule that every other node near the body follows."""
+
+    def __init__(self, grid: Grid, rest: np.ndarray, volume: np.ndarray, cut: Cut | None) -> None:
+        """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,)."""
+        self.grid, self.cut = grid, cut
+        nodes, weight, _ = self.stencil(rest)
+        sides = 1 if cut is None else 2
+        share = np.bincount(nodes.ravel(), (weight * volume[:, None]).ravel(), sides * grid.count)
+        self.place, self.rule = extension(grid, share, cut)
+
+    def stencil(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As Grid.stencil; a link across the cut leads to the node's copy on the point's own side, N further on."""
+        nodes, weight, gradient = self.grid.stencil(points)
+        if self.cut is not None:
+            across = self.cut.crosses(points[:, None], self.grid.positions()[nodes])
+            nodes = nodes + across.astype(np.int32) * self.grid.count
+        return nodes, weight, gradient
+
+    def links(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Solid nodes (Q, L) that carry points [m], (Q, 3), with weight and its gradient [1, 1/m], (Q, L, 4).
+
+        Rows shorter than the longest are padded with links of weight zero to their first node.
+        """
+        nodes, weight, gradient = self.stencil(points)
+        rows = np.repeat(np.arange(len(nodes)), 27)
+        size = (len(nodes), self.rule.shape[0])
+        parts = [
+            (sparse.csr_matrix((values.ravel(), (rows, nodes.ravel())), size) @ self.rule).tocsr()
+            for values in (weight, *np.moveaxis(gradient, -1, 0))
+        ]
+        # One pattern for the four: where one of them happens to be zero, the others need not be.
+        pattern = sum(abs(p) for p in parts).tocsr()
+        pattern.sort_indices()
+        lengths = np.diff(pattern.indptr)
+        row = np.repeat(np.arange(len(nodes)), lengths)
+        column = np.arange(pattern.nnz) - np.repeat(pattern.indptr[:-1], lengths)
+        index = np.zeros((len(nodes), max(1, int(lengths.max(initial=1)))), np.int32)
+        first = np.where(lengths > 0, pattern.indices[np.minimum(pattern.indptr[:-1], max(pattern.nnz - 1, 0))], 0)
+        index[:] = first[:, None]
+        index[row, column] = pattern.indices
+        link = np.zeros((*index.shape, 4))
+        for k, part in enumerate(parts):
+            link[row, column, k] = np.asarray(part[row, pattern.indices]).ravel()
+        return index, link
+
+    def carry(self, points: np.ndarray) -> sparse.csr_matrix:
+        """Interpolation from solid nodes to points [m], (Q, 3), (Q, A); rows far from the body sum to less than 1."""
+        index, link = self.links(points)
+        rows = np.repeat(np.arange(len(index)), index.shape[1])
+        return sparse.csr_matrix((link[..., 0].ravel(), (rows, index.ravel())), (len(index), len(self.place)))
+
+    def displaced(self, u: np.ndarray) -> np.ndarray:
+        """Nodal displacement [m], (..., N, 3) or (..., 2 N, 3) once cut, of every node that follows the body."""
+        flat = np.moveaxis(u.astype(float), -2, 0).reshape(len(self.place), -1)
+        return np.moveaxis((self.rule @ flat).reshape(-1, *u.shape[:-2], 3), 0, -2)
+
+    def inherited(self, other: "Nodes", u: np.ndarray) -> np.ndarray:
+        """Nodal values of `other`, (A', 3), over these nodes, (A, 3): both copies start as the node did."""
+        return other.displaced(u)[self.place % self.grid.count].astype(u.dtype)

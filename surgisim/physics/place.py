@@ -1,0 +1,63 @@
+"""Where a law acts: from a few numbers to one row a particle."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from surgisim.physics.catalogue import Numbers, Term
+from surgisim.problem import Problem
+
+
+@dataclass(frozen=True)
+class Place:
+    """A blob exp(-d^2 / (2 extent^2)) around a rest position."""
+
+    center: tuple[float, float, float]
+    """[m]"""
+    extent: float
+    """Standard deviation [m]."""
+
+    def weight(self, rest: np.ndarray) -> np.ndarray:
+        """Share of the law at rest points [m], (P, 3), between 0 and 1, (P,)."""
+        d = np.linalg.norm(np.asarray(rest, float) - np.asarray(self.center, float), axis=1)
+        return np.exp(-0.5 * (d / self.extent) ** 2)
+
+
+def rows(
+    terms: Mapping[str, Term],
+    values: Mapping[str, Numbers],
+    places: Mapping[str, Place],
+    rest: np.ndarray,
+    volume: np.ndarray,
+) -> np.ndarray:
+    """Columns of all laws at every particle, (P, M).
+
+    A column whose parameter has an off value fades to it outside the law's place; a total is shared out over the
+    place, per cubic metre. Raises Problem where a law that needs a place has none, or the place misses the body.
+    """
+    result = []
+    for name, term in terms.items():
+        place = places.get(name)
+        if place is None and term.place == "somewhere":
+            raise Problem(
+                f"law '{name}' acts at one place, and none is given. Give its centre and extent [m] under 'places'."
+            )
+        if place is not None and term.place == "everywhere":
+            raise Problem(f"law '{name}' acts on the whole body, but a place is given for it. Leave the place away.")
+        weight = np.ones(len(rest)) if place is None else place.weight(rest)
+        shared = float((weight * volume).sum())
+        if shared < 1e-6 * float(volume.sum()):
+            raise Problem(
+                f"law '{name}': its place at {np.round(place.center, 4).tolist()} m with extent {place.extent:.4f} m "
+                "holds no tissue. Move it into the body, or enlarge it."
+            )
+        for column, value in term.row(values[name]).items():
+            param = term.params.get(column)
+            if param is not None and param.total:
+                result.append(value * weight / shared)
+            elif param is not None and param.off is not None:
+                result.append(param.off + (value - param.off) * weight)
+            else:
+                result.append(np.full(len(rest), float(value)))
+    return np.stack(result, -1) if result else np.zeros((len(rest), 0))
