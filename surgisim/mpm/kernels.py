@@ -244,7 +244,7 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         F, Fdot = kinematics(u, v, index, link, slot, p)
         J = wp.determinant(F)
         # Written so that a NaN is trouble too.
-        if not (J > real(0.0)):
+        if not (real(0.0) < J):
             wp.atomic_min(trouble, 0, n)
             trouble[1] = p
         held = anchors.member[p]

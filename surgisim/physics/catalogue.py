@@ -104,6 +104,12 @@ class Term:
         return any(s is not None for s in slots)
 
     @property
+    def enters(self) -> str:
+        """Its slots in words."""
+        slots = ("stress", "factor", "flow", "force", "mass", "drive")
+        return " and ".join(s for s in slots if getattr(self, s) is not None)
+
+    @property
     def wide(self) -> bool:
         """Whether its stress asks for memory and clock."""
         return self.stress is not None and len(self.stress.input_types) > 3

@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from surgisim.physics.catalogue import Term, choose, defaults
+from surgisim.physics.catalogue import choose, defaults
 from surgisim.physics.rotation import rotation
 
 REAL = {"single": wp.float32, "double": wp.float64}
