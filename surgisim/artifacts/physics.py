@@ -21,9 +21,13 @@ class Physics(JsonArtifact):
     """How firmly instruments hold, as a share of the tissue's own stiffness; below 1 where a firmer grip would turn
     the tissue inside out, so that it slips instead [1]."""
 
+    form: str = "total"
+    """How the method follows the tissue: 'total' (weights fixed at rest) or 'updated' (the paper's)."""
+
     UNITS = {"density": "kg/m^3", "gravity": "m/s^2"}
 
     def __post_init__(self) -> None:
         check(self.density > 0, f"Physics: density {self.density} must be > 0.")
         check(0 < self.grip <= 1, f"Physics: grip {self.grip} must be above 0 and at most 1.")
+        check(self.form in ("total", "updated"), f"Physics: form '{self.form}' must be 'total' or 'updated'.")
         check(set(self.grid) == {"spacing", "step"}, f"Physics: grid has {sorted(self.grid)}, not spacing and step.")

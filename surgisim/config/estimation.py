@@ -38,6 +38,8 @@ class Estimation(Settings):
     """Weight of the rendered image's L1 misfit beside the tracks' in the per-particle refinement [-]."""
     image_frames: int = Field(8, ge=0)
     """Frames rendered in each iteration of the refinement [-]."""
+    form: Literal["total", "updated"] = "total"
+    """How the method follows the tissue: weights fixed at rest, or the paper's, which has no adjoint [-]."""
     device: Literal["cpu", "cuda"] = "cpu"
     """Where the simulation runs [-]."""
     seed: int = 0

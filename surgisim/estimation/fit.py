@@ -26,6 +26,7 @@ from surgisim.estimation.support import supports
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
 from surgisim.mpm.setup import Prepared, Values, prepare
 from surgisim.physics.catalogue import choose, columns
+from surgisim.problem import Problem
 
 Say = Callable[[float, float, str], None]
 
@@ -49,13 +50,18 @@ def estimate(
     Without a grip, or without motion, nothing drives the body and nothing can be learned: the
     parameters stay at their start values, and the fit says so.
     """
+    if settings.form == "updated" and settings.field_iterations:
+        raise Problem(
+            "config key 'estimation.form' is 'updated', which has no adjoint, but 'estimation.field_iterations' is "
+            f"{settings.field_iterations}. Set field_iterations to 0, or form to 'total'."
+        )
     wanted = search(settings.terms, settings.start, settings.fixed)
     tracked = tracks.xyz[:, 0][np.isfinite(tracks.xyz[:, 0]).all(1)]
     carried = np.concatenate([scene.mean, tracked]).astype(float)
     bodies = [
         prepare(
             body, tuple(settings.terms), density=settings.density, gravity=settings.gravity, carried=carried,
-            device=settings.device,
+            device=settings.device, form=settings.form,
         )
         for _ in range(WORKERS)
     ]  # fmt: skip
@@ -190,7 +196,7 @@ def _physics(
                 entry |= {"low": known["low"], "high": known["high"], "identifiable": known["told"]}
             terms[law][name] = entry
     grid = {"spacing": prepared.simulator.grid.spacing, "step": step}
-    return Physics(terms, settings.density, list(settings.gravity), grid, grip)
+    return Physics(terms, settings.density, list(settings.gravity), grid, grip, settings.form)
 
 
 def _unfitted(prepared: Prepared, wanted: Search, settings: Estimation, camera: Camera, why: str):

@@ -2,12 +2,14 @@
 
     python -m surgisim.mpm.benchmark --device cuda --particles 100000 --grid 50
 
-A block of tissue of 50 x 50 x 12 cells (for --grid 50), fixed corotated and viscous, is pulled at its
-face. Times are the best of a few bursts, so that other work on the machine disturbs them least.
+A block of tissue, fixed corotated and viscous, is pulled at its face. `plain` is a plain Warp step of the updated
+form (scatter, nodes, gather) on one thread, in the same run. Times are the best of a few bursts, so that other work
+on the machine disturbs them least.
 """
 
 import argparse
 import json
+import math
 import resource
 import time
 
@@ -17,36 +19,45 @@ import warp as wp
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.motion import Motion
 from surgisim.mpm.setup import Prepared, prepare
+from surgisim.mpm.updated import Updated
 
 VALUES = {"corotated": {"E": 3000.0, "nu": 0.45}, "newtonian": {"eta": 2.0}}
-FPS, FRAMES, EXTENT = 25.0, 4, 0.06
+FRAMES, STEPS, EXTENT = 2, 60, 0.06
+"""Frames of the motion, steps between two of them, and width of the world [m]."""
 
 
 def block(particles: int, grid: int, seed: int = 0) -> tuple[Body, Motion]:
-    """Random particles in a slab `grid` cells wide and a quarter as thick [m], and a pull of 3 mm at its face."""
+    """A jittered lattice of 8 particles a cell, four times as wide as thick, in a world `grid` cells wide [m].
+
+    A pull at its face drives it.
+    """
     spacing = EXTENT / grid
-    size = np.array([EXTENT, EXTENT, max(4, grid // 4) * spacing])
-    rest = np.random.default_rng(seed).uniform(0, 1, (particles, 3)) * size + [0, 0, 0.05]
+    thick = max(2, round((particles / 8 / 16) ** (1 / 3)))
+    wide = max(2, round(math.sqrt(particles / 8 / thick)))
+    cells = np.array([wide, wide, thick])
+    lattice = np.stack(np.meshgrid(*[np.arange(2 * n) for n in cells], indexing="ij"), -1).reshape(-1, 3)
+    jitter = np.random.default_rng(seed).uniform(-0.3, 0.3, lattice.shape)
+    rest = (lattice + 0.5 + jitter) * spacing / 2 + [0, 0, 0.05]
     # Sorted by cell: neighbours in memory share their nodes.
-    cell = ((rest - rest.min(0)) / spacing).astype(int)
+    cell = lattice // 2
     rest = rest[np.lexsort(cell.T[::-1])]
-    volume = np.full(particles, size.prod() / particles)
+    volume = np.full(len(rest), (spacing / 2) ** 3)
     held = rest[:, 2] > rest[:, 2].max() - spacing
     body = Body(
-        rest.astype(np.float32), volume.astype(np.float32), np.full((particles, 3), 0.5, np.float32),
+        rest.astype(np.float32), volume.astype(np.float32), np.full((len(rest), 3), 0.5, np.float32),
         rest[:, 2] < 0.05 + spacing, held, spacing,
     )  # fmt: skip
-    center = np.array([[EXTENT / 2, EXTENT / 2, 0.05]])
-    path = center + np.linspace(0, 1, FRAMES)[:, None] * np.array([0.0, 0.0, -0.003])
-    radius = np.array([max(0.005, 2 * spacing)])
-    return body, Motion(center, radius, path[None], np.ones((1, FRAMES), bool), np.ones(1), "given")
+    center = np.array([[*(wide * spacing / 2, wide * spacing / 2), 0.05]])
+    path = center + np.linspace(0, 1, FRAMES)[:, None] * np.array([0.0, 0.0, -0.1 * spacing])
+    return body, Motion(center, np.array([2 * spacing]), path[None], np.ones((1, FRAMES), bool), np.ones(1), "given")
 
 
-def measure(device: str, particles: int, grid: int, bursts: int) -> dict:
+def measure(device: str, particles: int, grid: int, bursts: int, threads: int) -> dict:
     """Microseconds per step, forward and adjoint (its recomputation not counted), and memory [MB]."""
     body, motion = block(particles, grid)
-    made = prepare(body, tuple(VALUES), density=1050.0, device=device)
-    path = made.drive(motion, VALUES, fps=FPS, per_frame=made.per_frame(VALUES, FPS))
+    made = prepare(body, tuple(VALUES), density=1050.0, device=device, threads=threads)
+    step = 1 / made.per_frame(VALUES, fps=1.0)
+    path = made.drive(motion, VALUES, fps=1 / (STEPS * step), per_frame=STEPS)
     theta, steps = made.theta(VALUES), path.steps
     run = made.simulator.run(theta, path)
     made.simulator.gradient(theta, path, run, np.ones_like(run.u))
@@ -54,13 +65,20 @@ def measure(device: str, particles: int, grid: int, bursts: int) -> dict:
     both = min(
         _seconds(lambda: made.simulator.gradient(theta, path, run, np.ones_like(run.u)), device) for _ in range(bursts)
     )
+    plain = Updated(
+        rest=body.rest, volume=body.volume, density=1050.0, grid=made.simulator.grid, terms=made.terms, device=device
+    )
+    plain_run = min(_seconds(lambda: plain.run(theta, path), device) for _ in range(bursts))
     return {
         "device": _name(device),
-        "particles": particles,
+        "threads": threads,
+        "particles": len(body.rest),
         "grid": grid,
         "nodes": len(made.simulator.place),
         "steps_timed": steps,
         "forward_us": round(1e6 * forward / steps, 1),
+        "plain_us": round(1e6 * plain_run / steps, 1),
+        "faster_than_plain": round(plain_run / forward, 2),
         "adjoint_us": round(1e6 * (both - forward) / steps, 1),
         "adjoint_over_forward": round((both - forward) / forward, 2),
         "particle_steps_per_second": round(particles * steps / forward),
@@ -92,9 +110,13 @@ def main() -> None:
     cli.add_argument("--device", choices=["cpu", "cuda"], default="cpu")
     cli.add_argument("--particles", type=int, nargs="+", default=[5000, 20000])
     cli.add_argument("--grid", type=int, default=50, help="cells along the longest side")
+    cli.add_argument("--threads", type=int, nargs="+", default=[1, 2], help="on a CPU")
     cli.add_argument("--bursts", type=int, default=3)
     arguments = cli.parse_args()
-    rows = [measure(arguments.device, n, arguments.grid, arguments.bursts) for n in arguments.particles]
+    threads = arguments.threads if arguments.device == "cpu" else [1]
+    rows = [
+        measure(arguments.device, n, arguments.grid, arguments.bursts, t) for n in arguments.particles for t in threads
+    ]
     print(json.dumps(rows, indent=1))
 
 

@@ -10,7 +10,8 @@ not on whole nodes, which would widen it by up to a cell.
 
 On a GPU both passes only gather: every node sums over its own links in a fixed order, so results do
 not depend on the number of threads. On a CPU, where a launch is one thread, particles add straight
-into the nodes instead: as repeatable, and without fetching every stress 27 times.
+into the nodes instead: as repeatable, and without fetching every stress 27 times; each of several threads has
+a share of the particles and its own part of the sums.
 
 State lives in a ring of slots, (L, N): slot n % L is read and slot (n + 1) % L written, which
 serves a plain run (L = 2) and a recorded segment (L = steps + 1) alike.
@@ -64,7 +65,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         link: wp.array2d(dtype=Link),
         stress: wp.array(dtype=Mat),
         push: wp.array(dtype=Vec),
-        force: wp.array(dtype=Vec),
+        force: wp.array2d(dtype=Vec),
     ):
         i = wp.tid()
         total = Vec()
@@ -72,7 +73,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
             p = entry[e] / link.shape[1]
             w = link[p, entry[e] - p * link.shape[1]]
             total += w[0] * push[p] - stress[p] * Vec(w[1], w[2], w[3])
-        force[i] = total
+        force[0, i] = total
 
     @wp.kernel(module="unique", enable_backward=False)
     def step(
@@ -81,7 +82,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         gravity: Vec,
         dt: real,
         slots: int,
-        force: wp.array(dtype=Vec),
+        force: wp.array2d(dtype=Vec),
         u: wp.array2d(dtype=Vec),
         v: wp.array2d(dtype=Vec),
     ):
@@ -89,10 +90,13 @@ def node_kernels(precision: str) -> SimpleNamespace:
         n = clock[0]
         here = n % slots
         there = (n + 1) % slots
-        speed = v[here, i] + dt * (force[i] / mass[i] + gravity)
+        total = Vec()
+        for part in range(force.shape[0]):
+            total += force[part, i]
+            force[part, i] = Vec()
+        speed = v[here, i] + dt * (total / mass[i] + gravity)
         v[there, i] = speed
         u[there, i] = u[here, i] + dt * speed
-        force[i] = Vec()
 
     @wp.kernel(module="unique", enable_backward=False)
     def before(
@@ -102,14 +106,19 @@ def node_kernels(precision: str) -> SimpleNamespace:
         dt: real,
         slots: int,
         v: wp.array2d(dtype=Vec),
-        u_bar: wp.array(dtype=Vec),
-        v_bar: wp.array(dtype=Vec),
+        u_bar: wp.array2d(dtype=Vec),
+        v_bar: wp.array2d(dtype=Vec),
         f_bar: wp.array(dtype=Vec),
         m_bar: wp.array(dtype=real),
     ):
         i = wp.tid()
-        total = v_bar[i] + dt * u_bar[i]
-        v_bar[i] = total
+        for part in range(1, u_bar.shape[0]):
+            u_bar[0, i] = u_bar[0, i] + u_bar[part, i]
+            v_bar[0, i] = v_bar[0, i] + v_bar[part, i]
+            u_bar[part, i] = Vec()
+            v_bar[part, i] = Vec()
+        total = v_bar[0, i] + dt * u_bar[0, i]
+        v_bar[0, i] = total
         f_bar[i] = (dt / mass[i]) * total
         if m_bar.shape[0] > 0:
             n = clock[0]
@@ -125,8 +134,8 @@ def node_kernels(precision: str) -> SimpleNamespace:
         Fdot_bar: wp.array(dtype=Mat),
         x_bar: wp.array(dtype=Vec),
         y_bar: wp.array(dtype=Vec),
-        u_bar: wp.array(dtype=Vec),
-        v_bar: wp.array(dtype=Vec),
+        u_bar: wp.array2d(dtype=Vec),
+        v_bar: wp.array2d(dtype=Vec),
     ):
         i = wp.tid()
         du = Vec()
@@ -137,8 +146,8 @@ def node_kernels(precision: str) -> SimpleNamespace:
             g = Vec(w[1], w[2], w[3])
             du += F_bar[p] * g + w[0] * x_bar[p]
             dv += Fdot_bar[p] * g + w[0] * y_bar[p]
-        u_bar[i] = u_bar[i] + du
-        v_bar[i] = v_bar[i] + dv
+        u_bar[0, i] = u_bar[0, i] + du
+        v_bar[0, i] = v_bar[0, i] + dv
 
     return SimpleNamespace(gather=gather, step=step, before=before, gather_back=gather_back)
 
@@ -230,23 +239,25 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         anchors: Anchors,
         dt: real,
         slots: int,
+        part: int,
+        begin: int,
         u: wp.array2d(dtype=Vec),
         v: wp.array2d(dtype=Vec),
         q: wp.array2d(dtype=Memory),
         stress: wp.array(dtype=Mat),
         push: wp.array(dtype=Vec),
-        force: wp.array(dtype=Vec),
-        trouble: wp.array(dtype=int),
+        force: wp.array2d(dtype=Vec),
+        trouble: wp.array2d(dtype=int),
     ):
-        p = wp.tid()
+        p = begin + wp.tid()
         n = clock[1]
         slot = clock[0] % slots
         F, Fdot = kinematics(u, v, index, link, slot, p)
         J = wp.determinant(F)
         # Written so that a NaN is trouble too.
         if not (real(0.0) < J):
-            wp.atomic_min(trouble, 0, n)
-            trouble[1] = p
+            wp.atomic_min(trouble, part, 0, n)
+            trouble[part, 1] = p
         held = anchors.member[p]
         x = Vec()
         y = Vec()
@@ -271,7 +282,7 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         if wp.static(scatter):
             for k in range(index.shape[1]):
                 w = link[p, k]
-                wp.atomic_add(force, index[p, k], w[0] * pull - piola * Vec(w[1], w[2], w[3]))
+                wp.atomic_add(force, part, index[p, k], w[0] * pull - piola * Vec(w[1], w[2], w[3]))
         else:
             stress[p] = piola
             push[p] = pull
@@ -288,6 +299,8 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         anchors: Anchors,
         dt: real,
         slots: int,
+        part: int,
+        begin: int,
         u: wp.array2d(dtype=Vec),
         v: wp.array2d(dtype=Vec),
         q: wp.array2d(dtype=Memory),
@@ -296,14 +309,14 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         Fdot_bar: wp.array(dtype=Mat),
         x_bar: wp.array(dtype=Vec),
         y_bar: wp.array(dtype=Vec),
-        u_bar: wp.array(dtype=Vec),
-        v_bar: wp.array(dtype=Vec),
+        u_bar: wp.array2d(dtype=Vec),
+        v_bar: wp.array2d(dtype=Vec),
         q_bar: wp.array(dtype=Memory),
         theta_bar: wp.array2d(dtype=real),
         rho_bar: wp.array(dtype=real),
-        path_bar: wp.array2d(dtype=Vec),
+        path_bar: wp.array3d(dtype=Vec),
     ):
-        p = wp.tid()
+        p = begin + wp.tid()
         n = clock[1]
         slot = clock[0] % slots
         F, Fdot = kinematics(u, v, index, link, slot, p)
@@ -340,16 +353,16 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
                     pulled = (volume[p] * anchors.hold[a, n]) * (wp.transpose(anchors.stiffness[a]) * b)
                     dx -= pulled
                     if path_bar.shape[0] > 0:
-                        wp.atomic_add(path_bar, a, n, pulled)
+                        wp.atomic_add(path_bar, part, a, n, pulled)
         if wp.static(scatter):
             for k in range(index.shape[1]):
                 w = link[p, k]
                 g = Vec(w[1], w[2], w[3])
-                wp.atomic_add(u_bar, index[p, k], dF * g + w[0] * dx)
+                wp.atomic_add(u_bar, part, index[p, k], dF * g + w[0] * dx)
                 if wp.static(laws.forces):
-                    wp.atomic_add(v_bar, index[p, k], dFdot * g + w[0] * dy)
+                    wp.atomic_add(v_bar, part, index[p, k], dFdot * g + w[0] * dy)
                 else:
-                    wp.atomic_add(v_bar, index[p, k], dFdot * g)
+                    wp.atomic_add(v_bar, part, index[p, k], dFdot * g)
         else:
             F_bar[p] = dF
             Fdot_bar[p] = dFdot

@@ -15,6 +15,7 @@ from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import ANCHOR, Drive, drive
 from surgisim.mpm.simulator import Simulator
 from surgisim.mpm.stable import check_step, largest_step, wave_speed
+from surgisim.mpm.updated import Updated
 from surgisim.physics.catalogue import Numbers, Term, choose, columns, defaults
 from surgisim.physics.place import Place, rows
 from surgisim.problem import Problem
@@ -30,7 +31,7 @@ LEAST_GRIP = 1.0
 class Prepared:
     """A body on its grid, and what its parameters mean."""
 
-    simulator: Simulator
+    simulator: Simulator | Updated
     terms: tuple[str, ...]
     density: float
     """[kg/m^3]"""
@@ -99,20 +100,19 @@ def prepare(
     places: Mapping[str, Place] | None = None,
     device: str = "cpu",
     precision: str = "single",
+    threads: int = 1,
+    form: str = "total",
 ) -> Prepared:
-    """Lay the grid around the body and every further rest point it has to carry [m], (Q, 3)."""
+    """Lay the grid around the body and every further rest point it has to carry [m], (Q, 3).
+
+    form: 'total', or 'updated' for the paper's (single precision, one thread, no adjoint, no cut).
+    """
     points = body.rest if carried is None else np.concatenate([body.rest, carried])
-    simulator = Simulator(
-        rest=body.rest,
-        volume=body.volume,
-        density=density,
-        grid=Grid.around(points, body.spacing),
-        terms=terms,
-        gravity=gravity,
-        cut=cut,
-        device=device,
-        precision=precision,
-    )
+    given = {
+        "rest": body.rest, "volume": body.volume, "density": density, "grid": Grid.around(points, body.spacing),
+        "terms": terms, "gravity": gravity, "cut": cut, "device": device,
+    }  # fmt: skip
+    simulator = Updated(**given) if form == "updated" else Simulator(**given, precision=precision, threads=threads)
     return Prepared(simulator, tuple(terms), density, body, places or {})
 
 

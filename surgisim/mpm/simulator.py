@@ -8,6 +8,7 @@ memory allowed is walked in several stretches.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import warp as wp
@@ -17,6 +18,7 @@ from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.kernels import node_kernels, particle_kernels, shapes, tick
+from surgisim.mpm.march import march
 from surgisim.mpm.nodes import Nodes
 from surgisim.physics.catalogue import choose, columns
 from surgisim.problem import Problem
@@ -77,8 +79,12 @@ class Simulator(Nodes):
         cut: Cut | None = None,
         device: str = "cpu",
         precision: str = "single",
+        threads: int = 1,
     ) -> None:
-        """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,); precision is 'single' or 'double'."""
+        """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,); precision is 'single' or 'double'.
+
+        threads: how many share a step on a CPU; results depend on their number by rounding only.
+        """
         self.rest, self.terms, self.device, self.density = np.asarray(rest, float), tuple(terms), device, float(density)
         self.count, self.volume_p, self.precision = len(rest), np.asarray(volume, float), precision
         super().__init__(grid, self.rest, self.volume_p, cut)
@@ -94,6 +100,8 @@ class Simulator(Nodes):
         self.volume, self.rest_d = self._put(self.volume_p, s.real), self._put(self.rest, s.Vec)
         self.gravity = s.Vec(*gravity)
         self.scatter = not wp.get_device(device).is_cuda
+        ends = np.linspace(0, self.count, (threads if self.scatter else 1) + 1).astype(int)
+        self.parts = [(int(a), int(b - a)) for a, b in pairwise(ends)]
         self.nodes = node_kernels(precision)
         self.kernels = particle_kernels(self.terms, self.scatter, precision)
         self.width = self.kernels.memory
@@ -102,8 +110,8 @@ class Simulator(Nodes):
         self.stress = wp.zeros(per_particle, dtype=s.Mat, device=device)
         self.push = wp.zeros(per_particle, dtype=s.Vec, device=device)
         self.clock = wp.zeros(2, dtype=int, device=device)
-        self.trouble = self._put(np.array([NEVER, 0]), int)
-        self.force = wp.zeros(len(self.place), dtype=s.Vec, device=device)
+        self.trouble = self._put(np.tile([NEVER, 0], (len(self.parts), 1)), int)
+        self.force = wp.zeros((len(self.parts), len(self.place)), dtype=s.Vec, device=device)
         # Loaded here, once: two threads that load one module at their first launch crash the process.
         for kernel in (self.kernels.step, self.kernels.adjoint, *vars(self.nodes).values(), tick):
             wp.load_module(kernel.module, device=device)
@@ -135,7 +143,7 @@ class Simulator(Nodes):
         self._load(task, begin or (), first * drive.per_frame)
         states = [self._state(task, 0)]
         for frame in range(first, last):
-            self._advance(task.forward, drive.per_frame)
+            march(task.forward, drive.per_frame)
             states.append(self._state(task, (frame + 1 - first) * drive.per_frame % 2))
             self._check(states, theta, drive, frame)
             if progress:
@@ -155,32 +163,33 @@ class Simulator(Nodes):
         stretch = self._stretch(per, memory_mb)
         task = self._task(theta, drive, stretch + 1)
         back = self._back(task, drive)
-        back.u.assign(u_bar[-1].astype(self.real))
+        back.u[0].assign(u_bar[-1].astype(self.real))
         for frame in range(len(run.u) - 1, 0, -1):
             if back.u.numpy().any() or back.v.numpy().any() or back.q.numpy().any():
                 self._walk_back(task, back, run.state(frame - 1), (first + frame - 1) * per, per, stretch)
-            total = back.u.numpy() + u_bar[frame - 1]
+            total = back.u.numpy().sum(0) + u_bar[frame - 1]
             if not np.isfinite(total).all():
                 raise Problem(
                     f"adjoint: a derivative is not finite at frame {first + frame - 1}. "
                     "The run is unstable there: take a smaller step."
                 )
-            back.u.assign(total.astype(self.real))
-        return Gradient(self._theta_bar(back), *(a.numpy().astype(float) for a in (back.path, back.u, back.v)))
+            back.u.zero_()
+            back.u[0].assign(total.astype(self.real))
+        return Gradient(self._theta_bar(back), *(a.numpy().astype(float).sum(0) for a in (back.path, back.u, back.v)))
 
     def _walk_back(self, task: "_Task", back: "_Back", state: State, step: int, count: int, stretch: int) -> None:
         """Back over `count` steps that began at `step` in `state`."""
         starts = [state]
         self._load(task, state, step)
         for _ in range(math.ceil(count / stretch) - 1):
-            self._advance(task.forward, stretch)
+            march(task.forward, stretch)
             starts.append(self._state(task, stretch))
             self._load(task, starts[-1], step + (len(starts) - 1) * stretch)
         for k in reversed(range(len(starts))):
             length = min(stretch, count - k * stretch)
             self._load(task, starts[k], step + k * stretch)
-            self._advance(task.forward, length)
-            self._advance(back.commands, length)
+            march(task.forward, length)
+            march(back.commands, length)
 
     def _stretch(self, per: int, memory_mb: float) -> int:
         """Steps that are recorded at once, so that their states and the starts of the other stretches fit."""
@@ -230,46 +239,56 @@ class Simulator(Nodes):
             self.mass.assign(self.node_mass(density).astype(self.real))
         u, v = (self._zeros((slots, len(self.place)), s.Vec) for _ in range(2))
         q = self._zeros((slots, self.count if self.width else 1), self.kernels.laws.Memory)
-        inputs = [
+        shared = [
             self.clock, self.index, self.link, self.volume, self._put(density, s.real), self.rest_d,
-            self._put(theta, s.real), self._anchors(drive), s.real(drive.step), slots, u, v, q,
+            self._put(theta, s.real), self._anchors(drive), s.real(drive.step), slots,
         ]  # fmt: skip
+        inputs = [[*shared, part, begin, u, v, q] for part, (begin, _) in enumerate(self.parts)]
         launch = {"device": self.device, "record_cmd": True}
         outs = [self.stress, self.push, self.force, self.trouble]
         nodes = [self.clock, self.mass, self.gravity, s.real(drive.step), slots, self.force, u, v]
         forward = [
-            wp.launch(self.kernels.step, self.count, inputs + outs, **launch),
-            wp.launch(self.nodes.step, len(self.place), nodes, **launch),
-            wp.launch(tick, 1, [self.clock, 1], **launch),
+            self._particles(self.kernels.step, inputs, outs),
+            [wp.launch(self.nodes.step, len(self.place), nodes, **launch)],
+            [wp.launch(tick, 1, [self.clock, 1], **launch)],
         ]
         if not self.scatter:
             links = [self.start, self.entry, self.link, self.stress, self.push, self.force]
-            forward.insert(1, wp.launch(self.nodes.gather, len(self.place), links, **launch))
+            forward.insert(1, [wp.launch(self.nodes.gather, len(self.place), links, **launch)])
         return _Task(slots, u, v, q, inputs, forward)
 
     def _back(self, task: "_Task", drive: Drive) -> "_Back":
         """Device arrays and recorded launches of the way back; nothing is stepped by recording them."""
         s, heavy = self.types, bool(self.kernels.laws.mass)
-        f, u, v = (self._zeros(len(self.place), s.Vec) for _ in range(3))
+        f = self._zeros(len(self.place), s.Vec)
+        u, v = (self._zeros((len(self.parts), len(self.place)), s.Vec) for _ in range(2))
         m = self._zeros(len(self.place) if heavy else 0, s.real)
         rho = self._zeros(self.count if heavy else 0, s.real)
         per_particle = 1 if self.scatter else self.count
         F, G = (self._zeros(per_particle, s.Mat) for _ in range(2))
         x, y = (self._zeros(per_particle, s.Vec) for _ in range(2))
         q = self._zeros(self.count if self.width else 1, self.kernels.laws.Memory)
-        theta, path = self._zeros((self.count, self.kernels.columns), s.real), self._zeros(drive.path.shape[:2], s.Vec)
+        theta = self._zeros((self.count, self.kernels.columns), s.real)
+        path = self._zeros((len(self.parts), *drive.path.shape[:2]), s.Vec)
         launch = {"device": self.device, "record_cmd": True}
         before = [self.clock, self.mass, self.gravity, s.real(drive.step), task.slots, task.v, u, v, f, m]
         outs = [f, F, G, x, y, u, v, q, theta, rho, path]
         commands = [
-            wp.launch(tick, 1, [self.clock, -1], **launch),
-            wp.launch(self.nodes.before, len(self.place), before, **launch),
-            wp.launch(self.kernels.adjoint, self.count, task.inputs + outs, **launch),
+            [wp.launch(tick, 1, [self.clock, -1], **launch)],
+            [wp.launch(self.nodes.before, len(self.place), before, **launch)],
+            self._particles(self.kernels.adjoint, task.inputs, outs),
         ]
         if not self.scatter:
             links = [self.start, self.entry, self.link, F, G, x, y, u, v]
-            commands.append(wp.launch(self.nodes.gather_back, len(self.place), links, **launch))
+            commands.append([wp.launch(self.nodes.gather_back, len(self.place), links, **launch)])
         return _Back(u, v, q, theta, path, m, rho, commands)
+
+    def _particles(self, kernel, inputs: list, outs: list) -> list:
+        """One recorded launch for each share of the particles."""
+        return [
+            wp.launch(kernel, count, mine + outs, device=self.device, record_cmd=True)
+            for mine, (_, count) in zip(inputs, self.parts, strict=True)
+        ]
 
     def _anchors(self, drive: Drive):
         s = self.types
@@ -290,20 +309,15 @@ class Simulator(Nodes):
             else:
                 array[0].zero_()
         self.clock.assign(np.array([0, step], np.int32))
-        self.trouble.assign(np.array([NEVER, 0], np.int32))
+        self.trouble.assign(np.tile(np.array([NEVER, 0], np.int32), (len(self.parts), 1)))
 
     def _state(self, task: "_Task", slot: int) -> State:
         u, v, q = (array[slot].numpy().copy() for array in (task.u, task.v, task.q))
         return u, v, q if self.width else np.zeros((self.count, 0), self.real)
 
-    def _advance(self, commands, steps: int) -> None:
-        for _ in range(steps):
-            for command in commands:
-                command.launch()
-
     def _check(self, states: list[State], theta: np.ndarray, drive: Drive, frame: int) -> None:
         """Stop where the last frame went wrong, and say where, when and by which law."""
-        step, particle = self.trouble.numpy()
+        step, particle = min(self.trouble.numpy().tolist())
         if step == NEVER and np.isfinite(states[-1][0]).all():
             return
         if step == NEVER:
@@ -312,10 +326,8 @@ class Simulator(Nodes):
             )
         task = self._task(theta, drive, 2)
         self._load(task, states[-2], frame * drive.per_frame)
-        self._advance(task.forward, max(0, int(step) - frame * drive.per_frame - 1))
-        law = culprit(
-            self, theta, self._state(task, max(0, int(step) - frame * drive.per_frame - 1) % 2), int(particle)
-        )
+        march(task.forward, max(0, step - frame * drive.per_frame - 1))
+        law = culprit(self, theta, self._state(task, max(0, step - frame * drive.per_frame - 1) % 2), int(particle))
         where = np.round(self.rest[particle], 4).tolist()
         raise Breakdown(
             f"simulation: particle {particle} at rest position {where} m turned inside out (or stopped being a "

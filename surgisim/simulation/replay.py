@@ -19,6 +19,9 @@ from surgisim.physics.catalogue import choose, defaults
 from surgisim.problem import Problem
 from surgisim.simulation.operation import Plan, plan
 
+THREADS = 2
+"""Threads of a run on a CPU; fixed, so that a replay has the same bytes on every number of cores."""
+
 
 def replay(
     body: Body,
@@ -96,7 +99,7 @@ def _parts(body: Body, scene: Scene, physics: Physics, task: Plan, device: str) 
     return [
         prepare(
             body, tuple(physics.terms), density=physics.density, gravity=tuple(physics.gravity),
-            carried=scene.mean.astype(float), cut=cut, device=device,
+            carried=scene.mean.astype(float), cut=cut, device=device, form=physics.form, threads=THREADS,
         )
         for cut in make
     ]  # fmt: skip

@@ -103,6 +103,18 @@ def test_two_runs_give_the_same_bytes():
     assert run(made, body, SOFT, pulled())[0].u.tobytes() == run(made, body, SOFT, pulled())[0].u.tobytes()
 
 
+def test_two_threads_do_what_one_does():
+    runs = []
+    for threads in (1, 2):
+        made, body = prepared(threads=threads)
+        out, path = run(made, body, SOFT, pulled())
+        weight = np.random.default_rng(0).standard_normal(out.u.shape)
+        runs.append((out.u, made.simulator.gradient(made.theta(SOFT), path, out, weight).theta))
+    (u, g), (u2, g2) = runs
+    assert np.abs(u - u2).max() < 1e-5 * np.abs(u).max()
+    assert np.abs(g - g2).max() < 1e-3 * np.abs(g).max()
+
+
 def test_a_run_goes_on_from_where_it_stopped():
     made, _ = prepared()
     motion = pulled()
