@@ -13,7 +13,8 @@ def rotation(F: wp.mat33):
         N = 0.5 * (R + wp.transpose(wp.inverse(R)))
         change = wp.ddot(N - R, N - R)
         R = N
-        if change < 1.0e-10:
+        # Newton's error is half the square of its last change.
+        if change < 1.0e-6:
             break
     return R
 
@@ -25,7 +26,7 @@ def rotation(F: wp.mat33d):  # noqa: F811 - Warp's own way to overload a functio
         N = wp.float64(0.5) * (R + wp.transpose(wp.inverse(R)))
         change = wp.ddot(N - R, N - R)
         R = N
-        if change < wp.float64(1.0e-24):
+        if change < wp.float64(1.0e-15):
             break
     return R
 
