@@ -16,3 +16,5 @@ class Fit(JsonArtifact):
     """Track error [m] on frames never fitted: fitted and with default parameters."""
     words: str
     """The outcome in plain sentences."""
+    numerical_damping: float | None = None
+    """Decay of free vibration by the method itself at the fitted step and spacing [1/s]; none where not measured."""

@@ -16,6 +16,7 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
+from surgisim.estimation.damping import numerical_damping
 from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
 from surgisim.estimation.picture import picture_loss
@@ -107,6 +108,9 @@ def estimate(
     progress(1.0, 1.0, f"held-out track error {after * 1e3:.3f} mm ({before * 1e3:.3f} mm with default parameters)")
     if refined:
         history += [{"round": "field", **h} for h in refined.history]
+    damping = None
+    if settings.form == "total":
+        damping = numerical_damping(body, settings.density, values, support.held, path.step, settings.device)
     fit = Fit(
         history=history,
         identifiability=table,
@@ -124,7 +128,8 @@ def estimate(
             "support": {"depth": support.depth, "rim": support.rim},
             "phases": [PHASES[k] for k in phase],
         },
-        words=in_words(table, support, trial.grip, path.per_frame, before, after),
+        words=in_words(table, support, trial.grip, path.per_frame, before, after, damping),
+        numerical_damping=damping,
     )
     names = np.array(columns(choose(bodies[0].terms)))
     material = Material(names, theta.astype(np.float32), support.held)

@@ -82,7 +82,9 @@ def _quantities(search: Search, x: np.ndarray, density: float, length: float):
         yield f"{m} / (density length^2)", np.eye(len(x))[place[m]], E / (density * length**2), "1/s^2", True
 
 
-def in_words(table: dict, support: Support, grip: float, steps: int, before: float, after: float) -> str:
+def in_words(
+    table: dict, support: Support, grip: float, steps: int, before: float, after: float, damping: float | None
+) -> str:
     """The outcome of a fit for a person."""
     told = [n for n, q in table.items() if q["told"]]
     edges = [n for n, q in table.items() if q["at_edge"]]
@@ -109,6 +111,8 @@ def in_words(table: dict, support: Support, grip: float, steps: int, before: flo
             + ", ".join(_quoted(n, table[n]) for n in edges)
             + "."
         )
+    if damping is not None:
+        parts.append(f"At this step and grid the method itself damps free vibration by {abs(damping):.2g} per second.")
     return " ".join(parts)
 
 

@@ -70,6 +70,8 @@ def test_planted_parameters_are_found_from_a_pull_and_its_release():
     assert nu == pytest.approx(0.38, abs=0.02)
     assert fit.held_out["fitted"] < 0.5 * fit.held_out["default"]
     assert fit.identifiability["newtonian.eta / corotated.E"]["told"]
+    assert abs(fit.numerical_damping) < 0.1
+    assert "damps free vibration" in fit.words
 
 
 def test_a_pull_without_a_release_cannot_tell_the_modulus():
