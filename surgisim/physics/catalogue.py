@@ -76,6 +76,8 @@ class Term:
     """`numpy (F, **columns) -> J/m^3` of rest volume, where the law stores energy."""
     columns: Callable[..., Numbers] | None = None
     """`(**params) -> columns of theta` where they are not the parameters themselves (angles to a direction)."""
+    spread: Callable[..., dict[str, Any]] | None = None
+    """`(rest (P, 3), **params) -> columns (P,)` that differ from particle to particle (the delay of a wave)."""
     wave_modulus: Callable[..., float] | None = None
     """`(**columns) -> lambda + 2 mu [Pa]` at rest: what the stable step is computed from."""
     viscosity: Callable[..., float] | None = None

@@ -52,12 +52,15 @@ def rows(
                 f"law '{name}': its place at {np.round(place.center, 4).tolist()} m with extent {place.extent:.4f} m "
                 "holds no tissue. Move it into the body, or enlarge it."
             )
-        for column, value in term.row(values[name]).items():
+        row = term.row(values[name])
+        if term.spread is not None:
+            row |= term.spread(rest, **values[name])
+        for column, value in row.items():
             param = term.params.get(column)
             if param is not None and param.total:
                 result.append(value * weight / shared)
             elif param is not None and param.off is not None:
                 result.append(param.off + (value - param.off) * weight)
             else:
-                result.append(np.full(len(rest), float(value)))
+                result.append(np.broadcast_to(np.asarray(value, float), len(rest)))
     return np.stack(result, -1) if result else np.zeros((len(rest), 0))

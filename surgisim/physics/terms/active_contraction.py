@@ -1,0 +1,77 @@
+"""Active contraction: tissue that pulls by itself, once or again and again, everywhere at once or as a wave.
+
+    sigma = tension (w(t) - w(0)) Fa (x) Fa / J                       [Pa]
+    w(t) = sin^2(pi phase / duty) while phase < duty, else 0;   phase = (t - onset) / period, modulo 1
+
+a is the direction of the pulling cells at rest. Each contraction lasts `duty` of a `period` [s]; a period longer than the
+clip makes it a single one. An onset before 0 finds the tissue in the middle of its rhythm: what the first frame holds
+already is in equilibrium there, hence - w(0). A wave reaches a point x of the body later by slowness (a . (x - middle)) [s].
+It puts energy in; with the clock stopped it stores energy as a spring does. Once differentiable in time and in every
+parameter (w'' jumps where a contraction begins and ends).
+Guccione and McCulloch, Mechanics of active contraction in cardiac muscle: part I, J. Biomech. Eng. 115 (1993), for the
+active stress along the fibre that adds to the passive one; the time course is ours.
+"""
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from surgisim.physics.catalogue import Param, Term
+from surgisim.physics.direction import angles, direction
+
+
+@wp.func
+def wave(t: Any, theta: Any):
+    turns = (t - theta[1]) / theta[2]
+    phase = turns - wp.floor(turns)
+    s = wp.sin(theta.dtype(wp.pi) * wp.min(phase / theta[3], theta.dtype(1.0)))
+    return wp.where(turns > theta.dtype(0.0), s * s, theta.dtype(0.0))
+
+
+@wp.func
+def stress(F: Any, D: Any, R: Any, q: Any, theta: Any, t: Any):
+    Fa = F * wp.vector(theta[4], theta[5], theta[6], dtype=F.dtype)
+    pull = theta[0] * (wave(t, theta) - wave(t - t, theta))
+    return (pull / wp.determinant(F)) * wp.outer(Fa, Fa)
+
+
+def twin_wave(t, onset, period, duty):
+    turns = (t - onset) / period
+    share = np.clip((turns % 1) / duty, 0, 1)
+    return np.sin(np.pi * share) ** 2 * (turns > 0)
+
+
+def twin(F, D, q, t, tension, onset, period, duty, **axis):
+    Fa = F @ np.array(list(axis.values()))
+    pull = tension * (twin_wave(t, onset, period, duty) - twin_wave(0.0, onset, period, duty))
+    return pull * Fa[..., :, None] * Fa[..., None, :] / np.linalg.det(F)[..., None, None]
+
+
+def columns(tension, onset, period, duty, slowness, azimuth, elevation):
+    timing = {"tension": tension, "onset": onset, "period": period, "duty": duty}
+    return timing | direction(azimuth, elevation)
+
+
+def spread(rest, onset, slowness, azimuth, elevation, **others):
+    """The onset at every particle [s], (P,)."""
+    a = np.array(list(direction(azimuth, elevation).values()))
+    return {"onset": onset + slowness * (rest - rest.mean(0)) @ a}
+
+
+TERM = Term(
+    stress=stress,
+    twin=twin,
+    wave_modulus=lambda tension, **others: tension,
+    columns=columns,
+    spread=spread,
+    rests=False,
+    params={
+        "tension": Param("Pa", low=1e0, high=1e4, default=2e2, off=0.0),
+        "onset": Param("s", low=-1e1, high=1e1, default=0.2, logarithmic=False),
+        "period": Param("s", low=0.2, high=6e1, default=4.0),
+        "duty": Param("1", low=0.05, high=1.0, default=0.5, logarithmic=False),
+        "slowness": Param("s/m", low=-1e3, high=1e3, default=0.0, logarithmic=False),
+        **angles(),
+    },
+)
