@@ -120,7 +120,7 @@ def device(name: str, precision: str) -> list[SimpleNamespace]:
     base = BASE if needs_base(term) else {}
     laws = folded((name, *base), precision)
     Mat, Vec, Memory, Theta, real = laws.Mat, laws.Vec, laws.Memory, laws.Theta, laws.real
-    respond, work = laws.respond, laws.work
+    work = laws.work
 
     @wp.kernel(module="unique", enable_backward=False)
     def evaluate(
@@ -132,13 +132,15 @@ def device(name: str, precision: str) -> list[SimpleNamespace]:
         dq: wp.array(dtype=Memory), dtheta: wp.array(dtype=Theta), drho: wp.array(dtype=real),
     ):  # fmt: skip
         i = wp.tid()
-        Pi, fi, ai = respond(F[i], Fdot[i], u[i], v[i], q[i], theta[i], t[i], dt, rho[i])
-        P[i] = Pi
-        f[i] = fi
-        after[i] = ai
-        a, c, d, e, g, h, _t, _dt, k, _A, _b, _Q = wp.grad(work)(
-            F[i], Fdot[i], u[i], v[i], q[i], theta[i], t[i], dt, rho[i], A[i], b[i], Q[i]
+        F0, Fdot0, u0, v0, q0, theta0, rho0 = F[i], Fdot[i], u[i], v[i], q[i], theta[i], rho[i]
+        t0, A0, b0, Q0 = t[i], A[i], b[i], Q[i]
+        # The work is linear in A, b and Q: its slopes by them are the response itself.
+        a, c, d, e, g, h, _t, _dt, k, x, y, z = wp.grad(work)(
+            F0, Fdot0, u0, v0, q0, theta0, t0, dt, rho0, A0, b0, Q0
         )
+        P[i] = x
+        f[i] = y
+        after[i] = z
         dF[i] = a
         dFdot[i] = c
         du[i] = d

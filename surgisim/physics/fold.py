@@ -41,10 +41,10 @@ def folded(names: tuple[str, ...], precision: str = "single") -> SimpleNamespace
         if term.force is not None:
             forces.append(_force(term.force, mine, own))
         if term.advance is not None:
-            steps.append(_advance(term.advance, mine, own, cell - term.memory, term.memory))
+            steps.append(_advance(term.advance, mine, own, cell - term.memory, term.memory, Memory))
     energies, losses, held = (_chain(k, _no_stress, _sum) for k in (elastic, other, balanced))
     factor, flow = _chain(factors, _unit_factor, _product), _chain(flows, _no_flow, _matrix_product)
-    force, step = _chain(forces, _no_force, _force_sum), _chain(steps, _no_step, _in_turn)
+    force, step = _chain(forces, _no_force, _force_sum), _chain(steps, _no_step, _step_sum)
     turns = any(t.wide for t in terms.values()) or bool(steps)
 
     @wp.func
@@ -56,7 +56,7 @@ def folded(names: tuple[str, ...], precision: str = "single") -> SimpleNamespace
         R = F
         if wp.static(turns):
             R = rotation(F)
-        after = step(F, D, R, u, q, q, theta, dt)
+        after = step(F, D, R, u, q, theta, dt)
         sigma = losses(F, D, R, after, theta, t)
         if wp.static(bool(flows)):
             G = flow(after, theta)
@@ -140,11 +140,13 @@ def _force(force, mine, own):
     return one
 
 
-def _advance(advance, mine, own, start, count):
+def _advance(advance, mine, own, start, count, Whole):
+    # Into a fresh vector, to be summed: where a component is overwritten, the adjoint of what was there before
+    # would stay.
     @wp.func
-    def one(F: Any, D: Any, R: Any, u: Any, q: Any, after: Any, theta: Any, dt: Any):
+    def one(F: Any, D: Any, R: Any, u: Any, q: Any, theta: Any, dt: Any):
         new = advance(F, D, R, u, own(q), mine(theta), dt)
-        whole = after
+        whole = Whole()
         for i in range(wp.static(count)):
             whole[wp.static(start) + i] = new[i]
         return whole
@@ -173,8 +175,8 @@ def _no_force(u: Any, v: Any, q: Any, rho: Any, theta: Any, t: Any):
 
 
 @wp.func
-def _no_step(F: Any, D: Any, R: Any, u: Any, q: Any, after: Any, theta: Any, dt: Any):
-    return after
+def _no_step(F: Any, D: Any, R: Any, u: Any, q: Any, theta: Any, dt: Any):
+    return q
 
 
 def _chain(parts, none, join):
@@ -219,9 +221,9 @@ def _force_sum(first, second):
     return both
 
 
-def _in_turn(first, second):
+def _step_sum(first, second):
     @wp.func
-    def both(F: Any, D: Any, R: Any, u: Any, q: Any, after: Any, theta: Any, dt: Any):
-        return second(F, D, R, u, q, first(F, D, R, u, q, after, theta, dt), theta, dt)
+    def both(F: Any, D: Any, R: Any, u: Any, q: Any, theta: Any, dt: Any):
+        return first(F, D, R, u, q, theta, dt) + second(F, D, R, u, q, theta, dt)
 
     return both

@@ -45,7 +45,7 @@ def strain(F: Any):
 def size(e: Any):
     """Equivalent strain."""
     small = e.dtype(SMALL)
-    return wp.sqrt(e.dtype(2.0 / 3.0) * wp.ddot(e, e) + small * small) - small
+    return wp.sqrt(e.dtype(2.0) / e.dtype(3.0) * wp.ddot(e, e) + small * small) - small
 
 
 @wp.func

@@ -29,9 +29,7 @@ def factor(F: Any, q: Any, theta: Any):
 
 @wp.func
 def advance(F: Any, D: Any, R: Any, u: Any, q: Any, theta: Any, dt: Any):
-    largest = q
-    largest[0] = wp.max(q[0], size(strain(F)))
-    return largest
+    return wp.vector(wp.max(q[0], size(strain(F))), length=1, dtype=F.dtype)
 
 
 def twin(F, q, onset, rate):

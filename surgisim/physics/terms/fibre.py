@@ -26,7 +26,7 @@ CRIMP = 0.01
 def stress(F: Any, D: Any, theta: Any):
     Fa = F * wp.vector(theta[2], theta[3], theta[4], dtype=F.dtype)
     x = wp.max(wp.dot(Fa, Fa) - F.dtype(1.0), F.dtype(0.0))
-    crimp = F.dtype(CRIMP * CRIMP)
+    crimp = F.dtype(CRIMP) * F.dtype(CRIMP)
     bottom = x * x + crimp
     r = x * x * x / bottom
     slope = x * x * (x * x + F.dtype(3.0) * crimp) / (bottom * bottom)

@@ -21,7 +21,7 @@ from surgisim.physics.strain import WORKING_STRETCH, deviator, twin_deviator
 @wp.func
 def stress(F: Any, D: Any, theta: Any):
     J = wp.determinant(F)
-    B = wp.pow(J, F.dtype(-2.0 / 3.0)) * (F * wp.transpose(F))
+    B = wp.pow(J, F.dtype(-2.0) / F.dtype(3.0)) * (F * wp.transpose(F))
     return (theta[0] / J * (wp.trace(B) - F.dtype(3.0))) * deviator(B)
 
 
