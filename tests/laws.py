@@ -108,7 +108,8 @@ def states(name: str) -> list[SimpleNamespace]:
             result.append(SimpleNamespace(
                 kind=kind, place=place, row=term.row(values), F=F, Fdot=moves * rng.uniform(-1, 1, (3, 3)),
                 u=moves * 5e-3 * rng.uniform(-1, 1, 3), v=moves * 5e-2 * rng.uniform(-1, 1, 3), q=q, t=1.0, rho=1050.0,
-                A=rng.standard_normal((3, 3)), b=1e-2 * rng.standard_normal(3), Q=1e3 * rng.standard_normal(term.memory),
+                A=rng.standard_normal((3, 3)), b=1e-2 * rng.standard_normal(3),
+                Q=1e3 * rng.standard_normal(term.memory),
             ))  # fmt: skip
     return result
 
@@ -135,9 +136,7 @@ def device(name: str, precision: str) -> list[SimpleNamespace]:
         F0, Fdot0, u0, v0, q0, theta0, rho0 = F[i], Fdot[i], u[i], v[i], q[i], theta[i], rho[i]
         t0, A0, b0, Q0 = t[i], A[i], b[i], Q[i]
         # The work is linear in A, b and Q: its slopes by them are the response itself.
-        a, c, d, e, g, h, _t, _dt, k, x, y, z = wp.grad(work)(
-            F0, Fdot0, u0, v0, q0, theta0, t0, dt, rho0, A0, b0, Q0
-        )
+        a, c, d, e, g, h, _t, _dt, k, x, y, z = wp.grad(work)(F0, Fdot0, u0, v0, q0, theta0, t0, dt, rho0, A0, b0, Q0)
         P[i] = x
         f[i] = y
         after[i] = z

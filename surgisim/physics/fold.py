@@ -44,7 +44,7 @@ def folded(names: tuple[str, ...], precision: str = "single") -> SimpleNamespace
             steps.append(_advance(term.advance, mine, own, cell - term.memory, term.memory, Memory))
     energies, losses, held = (_chain(k, _no_stress, _sum) for k in (elastic, other, balanced))
     factor, flow = _chain(factors, _unit_factor, _product), _chain(flows, _no_flow, _matrix_product)
-    force, step = _chain(forces, _no_force, _force_sum), _chain(steps, _no_step, _step_sum)
+    force, step = _chain(forces, _no_force, _force_sum), _chain(steps, _no_step, _in_turn)
     turns = any(t.wide for t in terms.values()) or bool(steps)
 
     @wp.func
@@ -56,7 +56,7 @@ def folded(names: tuple[str, ...], precision: str = "single") -> SimpleNamespace
         R = F
         if wp.static(turns):
             R = rotation(F)
-        after = step(F, D, R, u, q, theta, dt)
+        after = step(F, D, R, u, q, q, theta, dt)
         sigma = losses(F, D, R, after, theta, t)
         if wp.static(bool(flows)):
             G = flow(after, theta)
@@ -140,15 +140,20 @@ def _force(force, mine, own):
     return one
 
 
-def _advance(advance, mine, own, start, count, Whole):
-    # Into a fresh vector, to be summed: where a component is overwritten, the adjoint of what was there before
-    # would stay.
+def _advance(advance, mine, own, start, count, Memory):
+    # A new vector, filled: the adjoint of writing into a copy of `after` counts what was there before twice.
+    total = Memory._length_
+
     @wp.func
-    def one(F: Any, D: Any, R: Any, u: Any, q: Any, theta: Any, dt: Any):
+    def one(F: Any, D: Any, R: Any, u: Any, q: Any, after: Any, theta: Any, dt: Any):
         new = advance(F, D, R, u, own(q), mine(theta), dt)
-        whole = Whole()
+        whole = Memory()
+        for i in range(wp.static(start)):
+            whole[i] = after[i]
         for i in range(wp.static(count)):
             whole[wp.static(start) + i] = new[i]
+        for i in range(wp.static(start + count), wp.static(total)):
+            whole[i] = after[i]
         return whole
 
     return one
@@ -175,8 +180,8 @@ def _no_force(u: Any, v: Any, q: Any, rho: Any, theta: Any, t: Any):
 
 
 @wp.func
-def _no_step(F: Any, D: Any, R: Any, u: Any, q: Any, theta: Any, dt: Any):
-    return q
+def _no_step(F: Any, D: Any, R: Any, u: Any, q: Any, after: Any, theta: Any, dt: Any):
+    return after
 
 
 def _chain(parts, none, join):
@@ -221,9 +226,9 @@ def _force_sum(first, second):
     return both
 
 
-def _step_sum(first, second):
+def _in_turn(first, second):
     @wp.func
-    def both(F: Any, D: Any, R: Any, u: Any, q: Any, theta: Any, dt: Any):
-        return first(F, D, R, u, q, theta, dt) + second(F, D, R, u, q, theta, dt)
+    def both(F: Any, D: Any, R: Any, u: Any, q: Any, after: Any, theta: Any, dt: Any):
+        return second(F, D, R, u, q, first(F, D, R, u, q, after, theta, dt), theta, dt)
 
     return both

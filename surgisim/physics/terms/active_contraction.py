@@ -3,13 +3,14 @@
     sigma = tension (w(t) - w(0)) Fa (x) Fa / J                       [Pa]
     w(t) = sin^2(pi phase / duty) while phase < duty, else 0;   phase = (t - onset) / period, modulo 1
 
-a is the direction of the pulling cells at rest. Each contraction lasts `duty` of a `period` [s]; a period longer than the
-clip makes it a single one. An onset before 0 finds the tissue in the middle of its rhythm: what the first frame holds
-already is in equilibrium there, hence - w(0). A wave reaches a point x of the body later by slowness (a . (x - middle)) [s].
-It puts energy in; with the clock stopped it stores energy as a spring does. Once differentiable in time and in every
-parameter (w'' jumps where a contraction begins and ends).
-Guccione and McCulloch, Mechanics of active contraction in cardiac muscle: part I, J. Biomech. Eng. 115 (1993), for the
-active stress along the fibre that adds to the passive one; the time course is ours.
+a is the direction of the pulling cells at rest (by yaw and pitch, see physics/heading.py). Each contraction lasts
+`duty` of a `period` [s]; a period longer than the clip makes it a single one. An onset before 0 finds the tissue in
+the middle of its rhythm: what the first frame holds already is in equilibrium there, hence - w(0). A wave reaches a
+point x of the body later by slowness (a . (x - middle)) [s]. It puts energy in; with the clock stopped it stores
+energy as a spring does. Once differentiable in time and in every parameter (w'' jumps where a contraction begins
+and ends).
+Guccione and McCulloch, Mechanics of active contraction in cardiac muscle: part I, J. Biomech. Eng. 115 (1993), for
+the active stress along the fibre that adds to the passive one; the time course is ours.
 """
 
 from typing import Any
@@ -18,7 +19,7 @@ import numpy as np
 import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
-from surgisim.physics.direction import angles, direction
+from surgisim.physics.heading import heading
 
 
 @wp.func
@@ -48,15 +49,14 @@ def twin(F, D, q, t, tension, onset, period, duty, **axis):
     return pull * Fa[..., :, None] * Fa[..., None, :] / np.linalg.det(F)[..., None, None]
 
 
-def columns(tension, onset, period, duty, slowness, azimuth, elevation):
-    timing = {"tension": tension, "onset": onset, "period": period, "duty": duty}
-    return timing | direction(azimuth, elevation)
+def columns(tension, onset, period, duty, slowness, yaw, pitch):
+    x, y, z = heading(yaw, pitch)
+    return {"tension": tension, "onset": onset, "period": period, "duty": duty, "x": x, "y": y, "z": z}
 
 
-def spread(rest, onset, slowness, azimuth, elevation, **others):
+def spread(rest, onset, slowness, yaw, pitch, **others):
     """The onset at every particle [s], (P,)."""
-    a = np.array(list(direction(azimuth, elevation).values()))
-    return {"onset": onset + slowness * (rest - rest.mean(0)) @ a}
+    return {"onset": onset + slowness * (rest - rest.mean(0)) @ np.array(heading(yaw, pitch))}
 
 
 TERM = Term(
@@ -72,6 +72,7 @@ TERM = Term(
         "period": Param("s", low=0.2, high=6e1, default=4.0),
         "duty": Param("1", low=0.05, high=1.0, default=0.5, logarithmic=False),
         "slowness": Param("s/m", low=-1e3, high=1e3, default=0.0, logarithmic=False),
-        **angles(),
+        "yaw": Param("rad", low=-np.pi, high=np.pi, default=np.pi / 2, logarithmic=False),
+        "pitch": Param("rad", low=-np.pi, high=np.pi, default=0.0, logarithmic=False),
     },
 )

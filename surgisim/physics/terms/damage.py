@@ -6,8 +6,8 @@
 multiplies the stress of every law that stores energy, never heals, and never reaches one. With psi that energy, the
 power lost is -d(factor)/dt psi >= 0. <x> = x^3 / (x^2 + .02^2) for x > 0; one kink remains, where a load turns, as in
 everything that keeps its largest value.
-Simo, On a fully three-dimensional finite-strain viscoelastic damage model, CMAME 60 (1987), with strain in place of the
-energy norm, so that laws need not see one another.
+Simo, On a fully three-dimensional finite-strain viscoelastic damage model, CMAME 60 (1987), with strain in place of
+the energy norm, so that laws need not see one another.
 """
 
 from typing import Any

@@ -1,24 +1,23 @@
 """Pretension: tissue that is taut in what the camera first sees.
 
     psi = along |F a| + across |cof(F) a|                             [J/m^3]
-    sigma = (along Fa (x) Fa / |Fa| + across (c I - Ca (x) Ca / c)) / J,   Ca = cof(F) a,   c = |Ca|    [Pa]
+    sigma = (along Fa (x) Fa / |Fa| + across (c I - Ca (x) Ca / c)) / J       [Pa],  Ca = cof(F) a,  c = |Ca|
 
-Along a, threads of constant tension `along` [Pa]; across a, films of constant tension `across` [Pa], as soap has. Both turn
-with the tissue, and their tension does not grow with strain, so they add what is pretension's own, resistance to
-bending and lifting, and leave stretching to the elastic laws. The surroundings hold the first frame in equilibrium: the stress
-at rest is taken off again as a dead load. a, by default, points into the tissue: taut like a skin. Smooth
-everywhere, and linear in both tensions.
+Along a, threads of constant tension `along` [Pa]; across a, films of constant tension `across` [Pa], as soap has.
+Both turn with the tissue, and their tension does not grow with strain, so they add what is pretension's own,
+resistance to bending and lifting, and leave stretching to the elastic laws. The surroundings hold the first frame
+in equilibrium: the stress at rest is taken off again as a dead load. a (by yaw and pitch, see physics/heading.py)
+by default points into the tissue: taut like a skin. Smooth everywhere, and linear in both tensions.
 Biot, Mechanics of Incremental Deformations (1965), chapter 2.
 """
 
-import math
 from typing import Any
 
 import numpy as np
 import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
-from surgisim.physics.direction import angles, direction
+from surgisim.physics.heading import heading
 
 
 @wp.func
@@ -33,8 +32,8 @@ def stress(F: Any, D: Any, theta: Any):
     return (thread + film) / J
 
 
-def _normal(F, ax, ay, az):
-    return np.linalg.det(F)[..., None] * (np.swapaxes(np.linalg.inv(F), -1, -2) @ np.array([ax, ay, az]))
+def _normal(F, x, y, z):
+    return np.linalg.det(F)[..., None] * (np.swapaxes(np.linalg.inv(F), -1, -2) @ np.array([x, y, z]))
 
 
 def twin(F, D, along, across, **axis):
@@ -50,19 +49,23 @@ def energy(F, along, across, **axis):
     return along * np.linalg.norm(Fa, axis=-1) + across * np.linalg.norm(_normal(F, **axis), axis=-1)
 
 
+def columns(along, across, yaw, pitch):
+    x, y, z = heading(yaw, pitch)
+    return {"along": along, "across": across, "x": x, "y": y, "z": z}
+
+
 TERM = Term(
     stress=stress,
     twin=twin,
     energy=energy,
     wave_modulus=lambda along, across, **axis: along + across,
-    columns=lambda along, across, azimuth, elevation: {
-        "along": along, "across": across, **direction(azimuth, elevation),
-    },
+    columns=columns,
     rests=False,
     balanced=True,
     params={
         "along": Param("Pa", low=1e0, high=1e4, default=1e2, off=0.0),
         "across": Param("Pa", low=1e0, high=1e4, default=1e2, off=0.0),
-        **angles(elevation=math.pi / 2),
+        "yaw": Param("rad", low=-np.pi, high=np.pi, default=0.0, logarithmic=False),
+        "pitch": Param("rad", low=-np.pi, high=np.pi, default=0.0, logarithmic=False),
     },
-)  # fmt: skip
+)

@@ -3,14 +3,15 @@
     psi = G |dev U - q|^2,   dq/dt = (dev U - q) / tau                [J/m^3]
     sigma = (1/J) R (T + K) F^T,   T = 2 G (dev U - q)                [Pa]
 
-A spring of shear modulus G behind a dashpot of relaxation time tau, beside the base: a standard linear solid.
-F = R U; q is the strain that the dashpot has taken, in tissue's own frame, so it turns with the tissue. K is the
-skew tensor with K U + U K = U T - T U: with it the stress is d(psi)/dF and symmetric though q and U need not be
-coaxial. At rest in q the branch resists as 2 G dev does in fixed corotated elasticity, so G / mu is its share at every
-strain. A step takes q' = dev U + (q - dev U) exp(-dt / tau), exact where the strain is held. Power lost is
-2 G |dev U - q|^2 / tau >= 0. Smooth in everything. G and tau, not G tau and tau: the memory does not depend on G, so
-the misfit's slope at G = 0 already tells whether, where and with which tau a branch pays.
-Zener, Elasticity and Anelasticity of Metals (1948), chapter 5; Simo and Hughes, Computational Inelasticity (1998), ch. 10.
+A spring of shear modulus G behind a dashpot of relaxation time tau, beside the base: a standard linear solid. F = R
+U; q is the strain that the dashpot has taken, in tissue's own frame, so it turns with the tissue. K is the skew
+tensor with K U + U K = U T - T U: with it the stress is d(psi)/dF and symmetric though q and U need not be coaxial.
+At rest in q the branch resists as 2 G dev does in fixed corotated elasticity, so G / mu is its share at every
+strain. A step takes q' = dev U + (q - dev U) exp(-dt / tau), exact where the strain is held. Power lost is 2 G |dev
+U - q|^2 / tau >= 0. Smooth in everything. G and tau, not G tau and tau: the memory does not depend on G, so the
+misfit's slope at G = 0 already tells whether, where and with which tau a branch pays.
+Zener, Elasticity and Anelasticity of Metals (1948), chapter 5; Simo and Hughes, Computational Inelasticity (1998),
+ch. 10.
 """
 
 from typing import Any
@@ -20,8 +21,14 @@ import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
 from surgisim.physics.strain import (
-    deviator, of_eigenvalues, packed, twin_deviator, twin_packed, twin_unpacked, unpacked,
-)  # fmt: skip
+    deviator,
+    of_eigenvalues,
+    packed,
+    twin_deviator,
+    twin_packed,
+    twin_unpacked,
+    unpacked,
+)
 
 
 @wp.func
