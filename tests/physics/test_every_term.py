@@ -140,7 +140,7 @@ def test_resisting_a_rate_takes_power_out(name):
 @every_term
 @pytest.mark.parametrize("seconds", [0.1, 1.0, 10.0])
 def test_no_law_gives_out_more_than_was_put_in(name, seconds):
-    """Tissue led from rest through any cycle and back has cost work, or none, while a driven law's clock stands still."""
+    """Tissue led from rest through any cycle and back has cost work, or none, while a driven law's clock stops."""
     term, steps = on_particles(name), 400
     rng = np.random.default_rng(3)
     X, Y, x, y = (rng.uniform(-1, 1, (20, *shape)) for shape in ((3, 3), (3, 3), (3,), (3,)))

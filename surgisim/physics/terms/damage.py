@@ -2,9 +2,10 @@
 
     factor = exp(-rate <k - onset>),   k = the largest |e| so far,   e = dev (C - I) (C + I)^-1
 
-|e| is von Mises' equivalent strain, `onset` the strain from which damage begins, and 1 - factor = d the damage: it
-multiplies the stress of every law that stores energy, never heals, and never reaches one. With psi that energy, the
-power lost is -d(factor)/dt psi >= 0. <x> = x^3 / (x^2 + .02^2) for x > 0; one kink remains, where a load turns, as in
+|e| is von Mises' equivalent strain and `onset` the strain from which damage begins. The factor multiplies the stress
+of every law that stores energy; the damage 1 - factor never heals and never reaches one. With psi that energy, the
+power lost is -d(factor)/dt psi >= 0. k does not depend on `rate`, so the misfit's slope at rate = 0 already tells
+whether and where damage pays. <x> = x^3 / (x^2 + .02^2) for x > 0; one kink remains, where a load turns, as in
 everything that keeps its largest value.
 Simo, On a fully three-dimensional finite-strain viscoelastic damage model, CMAME 60 (1987), with strain in place of
 the energy norm, so that laws need not see one another.
