@@ -16,6 +16,8 @@ REAL = {"single": np.float32, "double": np.float64}
 TURN = np.array([[-0.8, -0.6, 0.0], [0.6, -0.8, 0.0], [0.0, 0.0, 1.0]]) @ np.array(
     [[1.0, 0.0, 0.0], [0.0, 0.28, -0.96], [0.0, 0.96, 0.28]]
 )
+LIFT = np.array([0.0, 0.0, 1.5])
+"""Most states are lifted toward the camera, as a grip would."""
 DT = 0.004
 ARGUMENTS = {"F": 1.0, "Fdot": 1.0, "u": 1e-3, "v": 1e-2, "q": 0.1, "theta": None, "rho": 1e3}
 """What is differentiated, and a typical size of it (theta's is its value)."""
@@ -107,7 +109,7 @@ def states(name: str) -> list[SimpleNamespace]:
             moves = 0.0 if (place, kind) == ("rest", "fresh") else 1.0
             result.append(SimpleNamespace(
                 kind=kind, place=place, row=term.row(values), F=F, Fdot=moves * rng.uniform(-1, 1, (3, 3)),
-                u=moves * 5e-3 * rng.uniform(-1, 1, 3), v=moves * 5e-2 * rng.uniform(-1, 1, 3), q=q, t=1.0, rho=1050.0,
+                u=moves * 6e-3 * (rng.uniform(-1, 1, 3) - LIFT), v=moves * 5e-2 * rng.uniform(-1, 1, 3), q=q, t=1.0, rho=1050.0,
                 A=rng.standard_normal((3, 3)), b=1e-2 * rng.standard_normal(3),
                 Q=1e3 * rng.standard_normal(term.memory),
             ))  # fmt: skip
@@ -178,14 +180,26 @@ def device(name: str, precision: str) -> list[SimpleNamespace]:
 
 @cache
 def slopes(name: str) -> list[dict[str, np.ndarray]]:
-    """Central differences of the same work by the twins, each times the size of what is differentiated."""
+    """Central differences of the same work by the twins, each times the size of what is differentiated.
+
+    Where the law is off, its columns are moved together, and from there toward the law's own values only: what
+    a diagnosis asks of a law that it has not switched on yet.
+    """
     term = TERMS[name]
 
     def work(s, row):
         P, f, after = response(term, s, row)
         return (s.A * P).sum() + s.b @ f + s.Q @ after
 
+    def onward(s):
+        h = 1e-5
+        at = [np.array(list(s.row.values())) + k * h * toward(name) for k in range(3)]
+        a, b, c = (work(s, dict(zip(s.row, x, strict=True))) for x in at)
+        return np.array([(4 * b - 3 * a - c) / (2 * h)])
+
     def slope(s, argument):
+        if s.kind == "off" and argument == "theta":
+            return onward(s)
         values = np.array(list(s.row.values())) if argument == "theta" else np.asarray(getattr(s, argument), float)
         result = np.zeros(values.size)
         for k in range(values.size):
@@ -203,6 +217,12 @@ def slopes(name: str) -> list[dict[str, np.ndarray]]:
         return result
 
     return [{a: slope(s, a) for a in ARGUMENTS} for s in states(name)]
+
+
+def toward(name: str) -> np.ndarray:
+    """From the columns of a law that is off to those of the law at work."""
+    on, off = (TERMS[name].row(values(TERMS[name])) for values in (typical, silent))
+    return np.array([on[c] - off[c] for c in on])
 
 
 def size_of(argument: str, value):

@@ -91,7 +91,7 @@ class Term:
     place: Literal["everywhere", "somewhere", "either"] = "either"
     """Where the law may act: on the whole body, in a blob, or both."""
     rests: bool = True
-    """Whether tissue at rest is free of its stress."""
+    """Whether tissue at rest is free of its stress and force in the first frame."""
     balanced: bool = False
     """Whether the surroundings hold its stress at rest in equilibrium, as they do in what a camera first sees."""
     example: Numbers = field(default_factory=dict)

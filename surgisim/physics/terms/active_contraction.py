@@ -65,7 +65,6 @@ TERM = Term(
     wave_modulus=lambda tension, **others: tension,
     columns=columns,
     spread=spread,
-    rests=False,
     params={
         "tension": Param("Pa", low=1e0, high=1e4, default=2e2, off=0.0),
         "onset": Param("s", low=-1e1, high=1e1, default=0.2, logarithmic=False),
