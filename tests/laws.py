@@ -109,7 +109,8 @@ def states(name: str) -> list[SimpleNamespace]:
             moves = 0.0 if (place, kind) == ("rest", "fresh") else 1.0
             result.append(SimpleNamespace(
                 kind=kind, place=place, row=term.row(values), F=F, Fdot=moves * rng.uniform(-1, 1, (3, 3)),
-                u=moves * 6e-3 * (rng.uniform(-1, 1, 3) - LIFT), v=moves * 5e-2 * rng.uniform(-1, 1, 3), q=q, t=1.0, rho=1050.0,
+                u=moves * 6e-3 * (rng.uniform(-1, 1, 3) - LIFT), v=moves * 5e-2 * rng.uniform(-1, 1, 3), q=q,
+                t=1.0, rho=1050.0,
                 A=rng.standard_normal((3, 3)), b=1e-2 * rng.standard_normal(3),
                 Q=1e3 * rng.standard_normal(term.memory),
             ))  # fmt: skip

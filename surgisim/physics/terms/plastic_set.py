@@ -8,10 +8,10 @@ tissue's own frame, each part along the strain that made it; |e| is von Mises' e
 of p stays, as a logarithmic strain: laws that store energy see F_e. 1 is perfect plasticity, below it tissue
 hardens (in any proportional load this is the return map with linear hardening (1 - share) / share), at 0 all comes
 back. Repeating a load adds nothing. The exponential keeps det F_e = det F. As |p| <= |e| - yield_strain wherever p
-grows, e : (e - share p) > 0 there: in isotropic tissue the set costs energy and never gives any. p does not depend on `share`, so the
-misfit's slope at share = 0 already tells whether and where a set pays. <x> = x^3 / (x^2 + .02^2) for x > 0: yield
-is soft over two per cent of strain; one kink remains, where a load turns, as in everything that keeps its largest
-value.
+grows, e : (e - share p) > 0 there: in isotropic tissue the set costs energy and never gives any. p does not depend
+on `share`, so the misfit's slope at share = 0 already tells whether and where a set pays. <x> = x^3 / (x^2 + .02^2)
+for x > 0: yield is soft over two per cent of strain; one kink remains, where a load turns, as in everything that
+keeps its largest value.
 Dorfmann and Ogden, A constitutive model for the Mullins effect with permanent set in particle-reinforced rubber,
 IJSS 41 (2004), for a set that follows the largest load; Weber and Anand, Finite deformation constitutive equations
 and a time integration procedure for isotropic, hyperelastic-viscoplastic solids, CMAME 79 (1990), for the
