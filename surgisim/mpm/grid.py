@@ -24,10 +24,18 @@ class Grid:
     """[m]"""
 
     @classmethod
-    def around(cls, points: np.ndarray, spacing: float) -> "Grid":
-        """The smallest grid on which every point [m], (Q, 3) has all of its 27 nodes."""
+    def around(cls, points: np.ndarray, spacing: float, carried: np.ndarray | None = None) -> "Grid":
+        """The smallest grid on which every point [m], (Q, 3) has all of its 27 nodes.
+
+        It is laid around `points`, and grown by whole cells for further points `carried` (Q', 3), so that those do
+        not shift where the cells fall.
+        """
         low, high = points.min(0).astype(float), points.max(0).astype(float)
         origin = low - 1.5 * spacing
+        if carried is not None and len(carried):
+            outer = carried.min(0).astype(float) - 1.5 * spacing
+            origin = origin - spacing * np.maximum(0, np.ceil((origin - outer) / spacing))
+            high = np.maximum(high, carried.max(0))
         shape = np.ceil((high - origin) / spacing).astype(int) + 3
         return cls(origin, shape, float(spacing))
 

@@ -107,9 +107,8 @@ def prepare(
 
     form: 'total', or 'updated' for the paper's (single precision, one thread, no adjoint, no cut).
     """
-    points = body.rest if carried is None else np.concatenate([body.rest, carried])
     given = {
-        "rest": body.rest, "volume": body.volume, "density": density, "grid": Grid.around(points, body.spacing),
+        "rest": body.rest, "volume": body.volume, "density": density, "grid": Grid.around(body.rest, body.spacing, carried),
         "terms": terms, "gravity": gravity, "cut": cut, "device": device,
     }  # fmt: skip
     simulator = Updated(**given) if form == "updated" else Simulator(**given, precision=precision, threads=threads)

@@ -43,6 +43,14 @@ def test_interpolation_reproduces_linear_fields_exactly():
     assert np.allclose(grid.deformation_gradient(field, points), np.eye(3) + A)
 
 
+def test_points_carried_along_do_not_shift_the_cells():
+    points = np.random.default_rng(0).uniform(0, 1, (50, 3))
+    alone, wider = Grid.around(points, 0.2), Grid.around(points, 0.2, np.array([[-0.33, 0.5, 2.0]]))
+    shift = (alone.origin - wider.origin) / 0.2
+    assert np.allclose(shift, np.round(shift))
+    assert (wider.stencil(np.array([[-0.33, 0.5, 2.0]]))[1].sum() - 1) < 1e-9
+
+
 def test_a_body_that_nothing_holds_falls_freely():
     made, body = prepared(gravity=(0.0, 9.81, 0.0))
     motion = free(body)
