@@ -108,7 +108,8 @@ def prepare(
     form: 'total', or 'updated' for the paper's (single precision, one thread, no adjoint, no cut).
     """
     given = {
-        "rest": body.rest, "volume": body.volume, "density": density, "grid": Grid.around(body.rest, body.spacing, carried),
+        "rest": body.rest, "volume": body.volume, "density": density,
+        "grid": Grid.around(body.rest, body.spacing, carried),
         "terms": terms, "gravity": gravity, "cut": cut, "device": device,
     }  # fmt: skip
     simulator = Updated(**given) if form == "updated" else Simulator(**given, precision=precision, threads=threads)
