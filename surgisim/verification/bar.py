@@ -92,7 +92,8 @@ def draw(result: dict):
     ax.text(min(x), 3.1, "bound: 3 %", fontsize=8)
     ax.axvline(1000 * result["thickness"] / CELLS, color="#1c2127", linewidth=0.8, linestyle=":")
     ax.set(xlabel="grid spacing [mm]", ylabel="|frequency / beam theory - 1| [%]", title=TITLE)
-    legend(ax)
+    legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    figure.set_size_inches(7.6, 3.8)
     return figure
 
 
@@ -111,6 +112,8 @@ def words(result: dict) -> str:
         "error",
         "clamp's share",
     ]
+    worst = {n: max(abs(r["error"]) for r in result["rows"] if r["cells"] == n) for n in sorted({3, rows[-1][1]})}
+    bound = ", ".join(f"{100 * value:.1f} % at {n} cells" for n, value in worst.items())
     slopes = "; ".join(f"{name}: {value:.1f}" for name, value in result["slopes"].items())
     return f"""
 A bar {1000 * result["length"]:.0f} mm long and {1000 * result["thickness"]:.0f} mm thick, E {result["E"]:.0f} Pa,
@@ -119,7 +122,7 @@ struck in its first mode. Axial: Love's rod; bending: Timoshenko's beam (Euler a
 below, is what `thickening` makes of tissue: 8 particles a cell and about {CELLS} cells over the thickness (dotted).
 
 {table(head, rows)}
-Slopes of the error over the spacing: {slopes}.
+Largest error: {bound}. Slopes of the error over the spacing: {slopes}.
 
 Free ends converge with the square of the spacing. A clamp does not: it is made of springs on the held particles and
 gives way over about half a cell, so a bar held by it is longer by dx/2 sqrt(E / (lambda + 2 mu)); the last column is

@@ -1,5 +1,7 @@
 """How the verification's plots look."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -26,7 +28,7 @@ def panels(count: int) -> tuple[Figure, list[Axes]]:
     return figure, axes
 
 
-def legend(ax: Axes, **place: str) -> None:
+def legend(ax: Axes, **place: Any) -> None:
     """The legend, and, now that the limits are known, readable numbers on logarithmic axes."""
     ax.legend(fontsize=7.5, frameon=False, **place)
     for axis, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):

@@ -4,6 +4,7 @@ import importlib
 import json
 
 import pytest
+from cheap_tree import cheap_tree
 
 from surgisim.problem import Problem
 from surgisim.verification.cases import Absent, Case, absence, cases, choose, data
@@ -55,3 +56,9 @@ def test_figures_are_kept_at_six_digits_and_what_is_no_number_as_null():
 
 def test_a_table_is_markdown():
     assert table(["a", "b"], [["x", 0.123456]]) == "| a | b |\n| --- | --- |\n| x | 0.123 |\n"
+
+
+def test_the_rule_measures_every_case_in_a_job_of_its_own_and_only_when_asked(tmp_path, monkeypatch):
+    monkeypatch.delenv("SURGISIM_DATA", raising=False)
+    wanted = {("verification_case", name) for name, case in cases().items() if case.data is None}
+    assert cheap_tree(tmp_path).plan("verification") == wanted | {("verification",)}

@@ -35,6 +35,8 @@ rule verification:
         page="docs/verification.md",
     log:
         "logs/verification.log",
+    benchmark:
+        "benchmarks/verification.tsv"
     conda:
         "../../envs/physics.yaml"
     resources:
