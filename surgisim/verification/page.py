@@ -9,8 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
 from surgisim.verification.cases import absence, cases
 
 Progress = Callable[[float, float, str], None]
@@ -36,7 +34,6 @@ def run(name: str, out: Path, *, quick: bool = False, progress: Progress = lambd
     picture = out / f".{name}.png"
     figure = module.draw(result)
     figure.savefig(picture, dpi=110, metadata={"Software": None})
-    matplotlib.pyplot.close(figure)
     kept = {"case": name, "title": module.TITLE, "quick": quick, "seconds": round(seconds, 1), "result": result}
     _replace(out / f"{name}.json", json.dumps(kept, indent=1) + "\n")
     os.replace(picture, out / f"{name}.png")
