@@ -94,7 +94,7 @@ def words(result: dict) -> str:
     head = ["cells over the thickness", "default step over", "step [ms]", "steps", "frequency [Hz]"]
     return f"""
 A rod of tissue (E {result["E"]:.0f} Pa, nu {result["nu"]}) vibrates freely along its length for a second, strain
-{result["strain"]:g}, without viscosity. Bound: {result["bound"]} per second. Minus is growth; what is left is the fit's own
-noise (a few other, weak modes) and rounding.
+{result["strain"]:g}, without viscosity. Bound: {result["bound"]} per second. Minus is growth; what is left is the fit's
+own noise (a few other, weak modes) and rounding.
 
 {table([*head, "decay of the amplitude [1/s]", "decay of the energy [1/s]"], rows)}"""

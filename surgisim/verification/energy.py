@@ -5,8 +5,7 @@ stored energy, and the product of the velocities half a step before and after (s
 
 Error model: symplectic Euler keeps a modified energy, so without viscosity the energy swings by a share of (omega dt)^2
 about a constant and does not drift. Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), theorem IX.8.1.
-With viscosity it falls; where it rises from one step to the next, by that same swing, the rise must
-vanish with the step.
+With viscosity it falls from step to step.
 """
 
 import numpy as np
@@ -38,13 +37,13 @@ def measure(progress, quick: bool = False) -> dict:
         runs = [motion(values, refine, duration) for refine in several]
         steps = [r["step"] for r in runs]
         row = {"laws": name, "dissipative": len(values) > 1, "runs": runs}
-        row["order_of_swing"] = slope(steps, [r["swing"] for r in runs])
+        row["order"] = None if row["dissipative"] else slope(steps, [r["growth"] for r in runs])
         rows.append(row)
     return {"duration": duration, "laws": rows}
 
 
 def motion(values: dict, refine: int, duration: float) -> dict:
-    """Energy of one free motion, relative to its first: curve, largest rise in a step, swing and drift [1/s]."""
+    """Energy of one free motion, relative to its first: curve, growth above its lowest so far, drift [1/s]."""
     laid = rod(block(SIZE, 2 * SPACING), values)
     step = laid.step / refine
     steps = int(duration / step)
@@ -58,9 +57,7 @@ def motion(values: dict, refine: int, duration: float) -> dict:
     thin = max(1, steps // 200)
     return {
         "step": step,
-        "rise": max(0.0, float(np.diff(energy).max())),
         "growth": float((energy - np.minimum.accumulate(energy)).max()),
-        "swing": float(np.std(energy - np.polyval(line, time)) if len(values) == 1 else np.diff(energy).max()),
         "drift": float(line[0]),
         "lost": float(1 - energy[-1]),
         "time": time[::thin],
@@ -73,20 +70,28 @@ def draw(result: dict):
     for color, row in zip(COLORS, result["laws"], strict=False):
         coarse = row["runs"][0]
         left.plot(coarse["time"], coarse["energy"], color=color, linewidth=1, label=row["laws"])
-        x, y = [1000 * r["step"] for r in row["runs"]], [r["growth"] for r in row["runs"]]
-        right.loglog(x, np.maximum(y, 1e-9), "o-", color=color, label=row["laws"])
-    reference(right, x, 0.1, 2)
+        if not row["dissipative"]:
+            x, y = [1000 * r["step"] for r in row["runs"]], [r["growth"] for r in row["runs"]]
+            right.loglog(x, y, "o-", color=color, label=f"{row['laws']} (slope {row['order']:.1f})")
+    reference(right, x, 2 * max(y), 2)
     left.set(xlabel="time [s]", ylabel="energy / first", title="at the default step", ylim=(0, None))
-    right.set(xlabel="step [ms]", ylabel="largest growth / first energy", title="growth above the lowest so far")
+    right.set(xlabel="step [ms]", ylabel="growth / first energy", title="swing without viscosity")
     legend(left)
     legend(right)
     return figure
 
 
 def words(result: dict) -> str:
-    return str(
-        [
-            [(r["step"], r["rise"], r["growth"], r["swing"], r["drift"], r["lost"]) for r in row["runs"]]
-            for row in result["laws"]
-        ]
-    )
+    rows = []
+    for row in result["laws"]:
+        for r in row["runs"]:
+            told = [row["laws"], f"{1000 * r['step']:.3f}", f"{r['growth']:.1e}"]
+            rows.append([*told, "" if row["dissipative"] else f"{r['drift']:+.1e}", f"{100 * r['lost']:.2f} %"])
+    orders = "; ".join(f"{row['laws']} {row['order']:.1f}" for row in result["laws"] if row["order"])
+    head = ["laws", "step [ms]", "largest growth above the lowest so far", "trend [1/s]", "lost at the end"]
+    return f"""
+A block that nothing holds, in violent motion (strains of some ten per cent) for {result["duration"]} s. Energies are
+shares of what is not flight at the start. Without viscosity the energy swings by a share that falls with the step
+(slopes: {orders}; 2 expected) and does not drift; with viscosity it only falls.
+
+{table(head, rows)}"""
