@@ -138,7 +138,7 @@ def words(result: dict) -> str:
     return f"""
 A rod of {1000 * result["length"]:.0f} x {1000 * result["side"]:.0f} x {1000 * result["side"]:.0f} mm, nu 0, strains of
 {result["strain"]:g}. Stretched within {RAMP} s and held: the pull of the anchors against the closed form for the
-strain of the middle half. Hung up by one end, gravity ({result["gravity"]} m/s²) switched on: the lengthening of the lower three
-quarters against the closed form. Errors are shares of the largest value; bound: 1 %.
+strain of the middle half. Hung up by one end, gravity ({result["gravity"]} m/s²) switched on: the lengthening of the
+lower three quarters against the closed form. Errors are shares of the largest value; bound: 1 %.
 
 {table(head, rows)}"""

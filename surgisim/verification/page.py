@@ -24,11 +24,11 @@ writes this page. Numbers behind every table: `docs/verification/NAME.json`.
 
 
 def run(name: str, out: Path, *, quick: bool = False, progress: Progress = lambda done, total, text: None) -> float:
-    """Measure one case and write NAME.json and NAME.png into `out`; how long it took [s]."""
+    """Measure one case and write NAME.json and NAME.png into `out`; the processor time it took [s]."""
     module = importlib.import_module(f"surgisim.verification.{name}")
-    begun = time.perf_counter()
+    begun = time.process_time()
     result = rounded(module.measure(progress, quick=quick))
-    seconds = time.perf_counter() - begun
+    seconds = time.process_time() - begun
     out.mkdir(parents=True, exist_ok=True)
     # Drawn before anything is written: a picture that fails leaves the old pair as it was.
     picture = out / f".{name}.png"
@@ -57,7 +57,7 @@ def assemble(out: Path, page: Path) -> list[str]:
             parts.append("*The small version that tests run, not the full one.*\n")
         parts.append(module.words(kept["result"]).strip() + "\n")
         parts.append(f"![{case.title}]({os.path.relpath(out / f'{name}.png', page.parent)})\n")
-        parts.append(f"`surgisim/verification/{name}.py`, {kept['seconds']:.0f} s.\n")
+        parts.append(f"`surgisim/verification/{name}.py`, {kept['seconds']:.0f} s of processor time.\n")
         shown.append(name)
     _replace(page, "\n".join(parts))
     return shown

@@ -128,8 +128,8 @@ def words(result: dict) -> str:
     order = "" if result["order"] is None else f" (slope over the step {result['order']:.2f}, 1 expected)"
     return f"""
 A slab of tissue, {result["particles"]} particles, spacing {1000 * result["spacing"]:.1f} mm, is pulled at its face,
-held and let go. Difference of the face's motion after the release, in the root mean square, between the default step and a
-quarter of it: {100 * result["off_quarter"]:.2f} % of the motion; against the finest step{order}:
+held and let go. Difference of the face's motion after the release, in the root mean square, between the default step
+and a quarter of it: {100 * result["off_quarter"]:.2f} % of the motion; against the finest step{order}:
 
 {table(["default step over", "step [ms]", "off the finest"], rows)}
 E and eta fitted at the default step to what a quarter of it made, and then simulated at that quarter: the motion
