@@ -58,7 +58,7 @@ def relaxation(values: dict, solid: LinearSolid, spacing: float) -> dict:
     mass = laid.made.body.volume.astype(float) * DENSITY
     at = np.arange(len(time)) * drive.per_frame
     pulls = [
-        drive.stiffness[a] * ((drive.path[a, at, 0][:, None] - u[:, cap]) @ mass[cap])
+        drive.stiffness[a, 0, 0] * ((drive.path[a, at, 0][:, None] - u[:, cap]) @ mass[cap])
         for a, cap in enumerate((laid.made.body.held, far))
     ]
     gauge = _along(laid, np.array([[LENGTH / 4, 0.0, 0.0], [3 * LENGTH / 4, 0.0, 0.0]]), out.u)

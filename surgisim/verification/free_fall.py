@@ -21,30 +21,32 @@ VALUES = {"corotated": {"E": 3000.0, "nu": 0.45}, "newtonian": {"eta": 1.0}}
 
 def measure(progress, quick: bool = False) -> dict:
     rows = []
-    several = (1, 4) if quick else (1, 2, 4, 8)
-    for done, refine in enumerate(several):
-        progress(done, len(several), f"step / {refine}")
-        rows.append(fall(refine))
+    plan = [(n, precision) for precision in ("single", "double") for n in ((1, 4) if quick else (1, 2, 4, 8))]
+    for done, (refine, precision) in enumerate(plan):
+        progress(done, len(plan), f"step / {refine}, {precision} precision")
+        rows.append(fall(refine, precision))
     order = slope([r["step"] for r in rows], [r["off_parabola"] for r in rows])
     return {"g": GRAVITY, "up": UP, "rows": rows, "order": order}
 
 
-def fall(refine: int) -> dict:
+def fall(refine: int, precision: str) -> dict:
     """A block thrown upwards along -y: distance [m] from both parabolas at the end, and how much it deforms."""
-    laid = rod(block((0.024, 0.024, 0.018), 0.006), VALUES, gravity=(0.0, GRAVITY, 0.0))
+    laid = rod(block((0.024, 0.024, 0.018), 0.006), VALUES, gravity=(0.0, GRAVITY, 0.0), precision=precision)
     steps = round(TIME / laid.step) * refine
     step, samples = TIME / steps, 10
     every = steps // samples
     begin = np.zeros_like(laid.nodes)
     v = begin - [0.0, UP, 0.0]
-    u = laid.run(step, every, samples, begin=(begin, v)).u.astype(float)
+    out = laid.run(step, every, samples, begin=(begin, v))
+    u = out.u.astype(float)
     time = np.arange(samples + 1) * every * step
     parabola = -UP * time + GRAVITY * time**2 / 2
     shifted = parabola + GRAVITY * time * step / 2
     return {
         "step": step,
         "steps": every * samples,
-        "eps": float(np.finfo(laid.run(step, 1, 1, begin=(begin, v)).u.dtype).eps / 2),
+        "precision": precision,
+        "eps": float(np.finfo(out.u.dtype).eps / 2),
         "time": time,
         "middle": u[..., 1].mean(1),
         "off_parabola": np.abs(u[..., 1].mean(1) - parabola).max(),
@@ -60,12 +62,15 @@ def draw(result: dict):
     left.plot(t, 1000 * np.array(row["middle"]), "o", color=COLORS[0], label="measured")
     left.plot(t, 1000 * (result["g"] * t**2 / 2 - result["up"] * t), color=COLORS[1], label="parabola")
     left.set(xlabel="time [s]", ylabel="fallen [mm]", title=TITLE)
-    steps = [1000 * r["step"] for r in result["rows"]]
-    off = [1000 * r["off_parabola"] for r in result["rows"]]
-    right.loglog(steps, off, "o-", color=COLORS[0], label=f"g t^2 / 2 (slope {result['order']:.2f})")
-    shifted = [1000 * r["off_shifted"] for r in result["rows"]]
-    right.loglog(steps, shifted, "o-", color=COLORS[1], label="g t (t + dt) / 2: rounding")
-    reference(right, steps, 1.5 * max(off), 1)
+    for color, precision in zip(COLORS, ("single", "double"), strict=False):
+        rows = [r for r in result["rows"] if r["precision"] == precision]
+        steps = [1000 * r["step"] for r in rows]
+        if precision == "single":
+            off = [1000 * r["off_parabola"] for r in rows]
+            right.loglog(steps, off, "s-", color=COLORS[2], label=f"g t^2 / 2 (slope {result['order']:.2f})")
+            reference(right, steps, 2 * max(off), 1)
+        shifted = [1000 * r["off_shifted"] for r in rows]
+        right.loglog(steps, shifted, "o-", color=color, label=f"g t (t + dt) / 2, {precision}")
     right.set(xlabel="step [ms]", ylabel="largest distance [mm]", title="from the parabola")
     legend(left)
     legend(right)
@@ -75,13 +80,21 @@ def draw(result: dict):
 def words(result: dict) -> str:
     rows = [
         [
+            r["precision"],
             f"{1e3 * r['step']:.3f}",
             r["steps"],
-            *(f"{1e6 * r[k]:.4f}" for k in ("off_parabola", "off_shifted", "deforms")),
+            *(f"{1e6 * r[k]:.2e}" for k in ("off_parabola", "off_shifted", "deforms")),
         ]
         for r in result["rows"]
     ]
-    head = ["step [ms]", "steps", "from g t²/2 [um]", "from g t (t + dt)/2, any node [um]", "deformation [um]"]
+    head = [
+        "precision",
+        "step [ms]",
+        "steps",
+        "from g t²/2 [um]",
+        "from g t (t + dt)/2, any node [um]",
+        "deformation [um]",
+    ]
     return f"""
 A block thrown upwards at {result["up"]} m/s falls for {result["rows"][0]["time"][-1]:.1f} s. Symplectic Euler is half a
 step of fall ahead of the parabola (slope over the step {result["order"]:.2f}, 1 expected); beside that only rounding is

@@ -23,6 +23,18 @@ class LinearSolid:
     branches: tuple[tuple[float, float], ...] = ()
     """Modulus [Pa] and relaxation time [s] of every Maxwell branch."""
 
+    @classmethod
+    def of_shear(cls, E: float, nu: float, g: float, tau: float) -> "LinearSolid":
+        """A thin rod of a solid whose shear relaxes, mu + g exp(-t / tau), and whose bulk modulus does not.
+
+        E [Pa] and nu are the long-time ones, g [Pa] the branch's shear modulus. By correspondence the rod's modulus is
+        9 K mu / (3 K + mu) with mu(s) = mu + g s tau / (1 + s tau), which again has a single pole: one branch, slower
+        than tau by (3 K + mu + g) / (3 K + mu).
+        """
+        mu, K = E / (2 * (1 + nu)), E / (3 * (1 - 2 * nu))
+        glassy = 9 * K * (mu + g) / (3 * K + mu + g)
+        return cls(E, branches=((glassy - E, tau * (3 * K + mu + g) / (3 * K + mu)),))
+
     def stress(self, time: np.ndarray, strain: np.ndarray) -> np.ndarray:
         """Stress [Pa] of a strain history (T,) at `time` [s], taken as straight between its samples."""
         rate = np.diff(strain) / np.diff(time)

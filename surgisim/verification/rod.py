@@ -58,12 +58,13 @@ class Rod:
         drive = self.made.drive(
             unmoved(samples + 1), self.values, fps=1 / (step * every), per_frame=every, frames=samples + 1
         )
-        return self.made.simulator.run(self.made.theta(self.values), drive, begin=begin)
+        begun = {} if begin is None else {"begin": begin}
+        return self.made.simulator.run(self.made.theta(self.values), drive, **begun)
 
 
-def rod(body: Body, values: Values, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Rod:
-    """Lay `body` on its grid."""
-    made = prepare(body, tuple(values), density=DENSITY, gravity=gravity)
+def rod(body: Body, values: Values, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0), **engine: str) -> Rod:
+    """Lay `body` on its grid; `engine`: precision or form, as for `prepare`."""
+    made = prepare(body, tuple(values), density=DENSITY, gravity=gravity, **engine)
     simulator = made.simulator
     return Rod(made, values, simulator.grid.positions()[simulator.place], simulator.mass.numpy().astype(float))
 

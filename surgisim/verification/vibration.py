@@ -35,13 +35,17 @@ class Vibration:
         return 2 * np.pi * self.decay / self.omega
 
 
-def vibration(time: np.ndarray, q: np.ndarray, omega: float) -> Vibration:
-    """Least-squares fit of one decaying cosine to q (T,) at `time` [s]; `omega` is a first guess [rad/s], to 20 %."""
+def vibration(time: np.ndarray, q: np.ndarray, omega: float, *, about: bool = False) -> Vibration:
+    """Least-squares fit of one decaying cosine to q (T,) at `time` [s]; `omega` is a first guess [rad/s], to 20 %.
+
+    about: whether it swings about an unknown constant instead of zero.
+    """
     scale = np.abs(q).max()
 
     def columns(rate, decay):
         envelope = np.exp(-decay * time)
-        return np.stack([envelope * np.cos(rate * time), envelope * np.sin(rate * time)], 1)
+        cosine, sine = envelope * np.cos(rate * time), envelope * np.sin(rate * time)
+        return np.stack([cosine, sine, np.ones_like(time)] if about else [cosine, sine], 1)
 
     def residual(x):
         basis = columns(*x)
@@ -53,7 +57,7 @@ def vibration(time: np.ndarray, q: np.ndarray, omega: float) -> Vibration:
     begin = min(guesses, key=lambda g: np.sum(residual((g, 0.0)) ** 2))
     found = least_squares(residual, (begin, 0.0), x_scale=(omega, max(1 / span, 1e-3)), xtol=1e-14, ftol=1e-14)
     rate, decay = found.x
-    a, b = np.linalg.lstsq(columns(rate, decay), q, rcond=None)[0]
+    a, b = np.linalg.lstsq(columns(rate, decay), q, rcond=None)[0][:2]
     size = float(np.hypot(a, b))
     rest = float(np.sqrt(np.mean(found.fun**2)) * scale / size)
     return Vibration(size, float(rate), float(decay), float(np.arctan2(b, a)), rest)

@@ -73,6 +73,12 @@ def test_a_vibration_without_viscosity_does_not_die():
         assert abs(row["energy_decay"]) < 0.1
 
 
+def test_only_the_updated_form_damps_and_more_with_smaller_steps():
+    decay = {(r["form"], r["refine"]): r["decay"] for r in measured("damping")["forms"]}
+    assert max(abs(decay["total", n]) for n in (1, 4)) < 0.05
+    assert 0.05 < decay["updated", 1] < decay["updated", 4] / 2
+
+
 def test_parameters_fitted_at_one_step_size_predict_a_release_at_a_quarter_of_it():
     result = measured("release")
     assert result["off_quarter"] < result["bound"]
