@@ -73,7 +73,8 @@ def draw(result: dict):
         for eps in sorted({row["eps"] for row in result["laws"]}):
             ax.loglog(n, eps * np.sqrt(n), "--", color="#5d6773", linewidth=1, label=f"{eps:.0e} sqrt(n)")
         ax.set(xlabel="steps n", ylabel="relative change", title=title, ylim=(1e-18, 1e-4))
-    legend(axes[0])
+    for ax in axes:
+        legend(ax, loc="center left")
     return figure
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from surgisim.report.palette import INK, LINE, MUTED
 
@@ -25,8 +26,16 @@ def panels(count: int) -> tuple[Figure, list[Axes]]:
     return figure, axes
 
 
-def legend(ax: Axes) -> None:
-    ax.legend(fontsize=8, frameon=False)
+def legend(ax: Axes, **place: str) -> None:
+    """The legend, and, now that the limits are known, readable numbers on logarithmic axes."""
+    ax.legend(fontsize=7.5, frameon=False, **place)
+    for axis, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
+        if axis.get_scale() != "log":
+            continue
+        axis.set_minor_formatter(NullFormatter())
+        if high < 200 * low:
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.set_major_formatter(FuncFormatter(lambda value, at: f"{value:g}"))
 
 
 def reference(ax: Axes, x: list[float], y: float, order: float) -> None:

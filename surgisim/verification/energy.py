@@ -1,7 +1,7 @@
 """Total energy: kept without viscosity, never growing with it.
 
 A free block is set in violent motion (strains of some ten per cent). Energy at a displacement's own time: the laws'
-stored energy, and the product of the velocities half a step before and after (see energies.py).
+stored energy, and the product of the velocities half a step before and after (see energies.py). Double precision.
 
 Error model: symplectic Euler keeps a modified energy, so without viscosity the energy swings by a share of (omega dt)^2
 about a constant and does not drift. Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), theorem IX.8.1.
@@ -44,7 +44,7 @@ def measure(progress, quick: bool = False) -> dict:
 
 def motion(values: dict, refine: int, duration: float) -> dict:
     """Energy of one free motion, relative to its first: curve, growth above its lowest so far, drift [1/s]."""
-    laid = rod(block(SIZE, 2 * SPACING), values)
+    laid = rod(block(SIZE, 2 * SPACING), values, precision="double")
     step = laid.step / refine
     steps = int(duration / step)
     out = laid.run(step, 1, steps, begin=(np.zeros_like(laid.nodes), flight(laid)))

@@ -58,8 +58,8 @@ def fall(refine: int, precision: str) -> dict:
 def draw(result: dict):
     figure, (left, right) = panels(2)
     row = result["rows"][0]
-    t = np.array(row["time"])
-    left.plot(t, 1000 * np.array(row["middle"]), "o", color=COLORS[0], label="measured")
+    left.plot(row["time"], 1000 * np.array(row["middle"]), "o", color=COLORS[0], label="measured")
+    t = np.linspace(0, row["time"][-1], 100)
     left.plot(t, 1000 * (result["g"] * t**2 / 2 - result["up"] * t), color=COLORS[1], label="parabola")
     left.set(xlabel="time [s]", ylabel="fallen [mm]", title=TITLE)
     for color, precision in zip(COLORS, ("single", "double"), strict=False):

@@ -22,6 +22,8 @@ class LinearSolid:
     """Axial viscosity [Pa s]."""
     branches: tuple[tuple[float, float], ...] = ()
     """Modulus [Pa] and relaxation time [s] of every Maxwell branch."""
+    fast_nu: float = 0.0
+    """Poisson's ratio of what is too fast to relax."""
 
     @classmethod
     def of_shear(cls, E: float, nu: float, g: float, tau: float) -> "LinearSolid":
@@ -32,8 +34,14 @@ class LinearSolid:
         than tau by (3 K + mu + g) / (3 K + mu).
         """
         mu, K = E / (2 * (1 + nu)), E / (3 * (1 - 2 * nu))
-        glassy = 9 * K * (mu + g) / (3 * K + mu + g)
-        return cls(E, branches=((glassy - E, tau * (3 * K + mu + g) / (3 * K + mu)),))
+        fast = mu + g
+        branch = 9 * K * fast / (3 * K + fast) - E, tau * (3 * K + fast) / (3 * K + mu)
+        return cls(E, branches=(branch,), fast_nu=(3 * K - 2 * fast) / (2 * (3 * K + fast)))
+
+    @property
+    def fast(self) -> float:
+        """Modulus of what is too fast to relax [Pa]."""
+        return self.E + sum(modulus for modulus, _ in self.branches)
 
     def stress(self, time: np.ndarray, strain: np.ndarray) -> np.ndarray:
         """Stress [Pa] of a strain history (T,) at `time` [s], taken as straight between its samples."""
@@ -50,6 +58,7 @@ class LinearSolid:
     def hung(self, time: np.ndarray, x: np.ndarray, length: float, density: float, gravity: float) -> np.ndarray:
         """Displacement [m] of a hanging rod at x (Q,) below its clamp [m], (T, Q), when gravity is switched on at 0.
 
+        A viscous one begins undeformed; another begins where it would hang if nothing relaxed, and does not bounce.
         Modes sin(k x), k = (2 n - 1) pi / (2 L); inertia included. `time` [s], (T,), begins at 0 and is evenly spaced.
         """
         total = np.zeros((len(time), len(x)))
@@ -66,6 +75,9 @@ class LinearSolid:
                 A[2 + b, 1], A[2 + b, 2 + b] = modulus, -1 / tau
             step, state = expm(A * (time[1] - time[0])), np.zeros(len(A))
             state[-1] = 1
+            if not self.eta:
+                state[0] = A[1, -1] / (stiff * self.fast)
+                state[2:-1] = [modulus * state[0] for modulus, _ in self.branches]
             shape = np.sin(k * x)
             for t in range(len(time)):
                 total[t] += shape * state[0]

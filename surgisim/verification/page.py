@@ -31,13 +31,17 @@ def run(name: str, out: Path, *, quick: bool = False, progress: Progress = lambd
     seconds = time.process_time() - begun
     out.mkdir(parents=True, exist_ok=True)
     # Drawn before anything is written: a picture that fails leaves the old pair as it was.
-    picture = out / f".{name}.png"
-    figure = module.draw(result)
-    figure.savefig(picture, dpi=110, metadata={"Software": None})
+    draw(name, result, out)
     kept = {"case": name, "title": module.TITLE, "quick": quick, "seconds": round(seconds, 1), "result": result}
     _replace(out / f"{name}.json", json.dumps(kept, indent=1) + "\n")
-    os.replace(picture, out / f"{name}.png")
     return seconds
+
+
+def draw(name: str, result: dict, out: Path) -> None:
+    """Write NAME.png."""
+    figure = importlib.import_module(f"surgisim.verification.{name}").draw(result)
+    figure.savefig(out / f".{name}.png", dpi=110, metadata={"Software": None})
+    os.replace(out / f".{name}.png", out / f"{name}.png")
 
 
 def assemble(out: Path, page: Path) -> list[str]:
