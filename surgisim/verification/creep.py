@@ -165,7 +165,8 @@ def words(result: dict) -> str:
     return f"""
 A rod of {1000 * result["length"]:.0f} x {1000 * result["side"]:.0f} x {1000 * result["side"]:.0f} mm, nu 0, strains of
 {result["strain"]:g}. Stretched within {RAMP} s and held: the pull of the anchors against the closed form for the
-strain of the middle half. Hung up by one end, gravity ({result["gravity"]} m/s²) switched on (a solid that only relaxes
-starts settled, before anything has relaxed): the lengthening of the lower three quarters against the closed form. Errors are shares of the largest value; bound: 1 %.
+strain of the middle half. Hung up by one end under gravity ({result["gravity"]} m/s²): the lengthening of the lower
+three quarters against the closed form; a solid that has no viscosity starts where it hangs before anything relaxes.
+Errors are shares of the largest value; bound: 1 %.
 
 {table(head, rows)}"""
