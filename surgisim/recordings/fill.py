@@ -24,7 +24,8 @@ def fill(
     boxes: lower and upper corners of what does not move, rest space [m], (B, 2, 3). A particle is held where a
     box covers it; a box too thin to cover any holds the layer it touches. Particles stand at the middle of the
     tissue they stand for, and their volumes add up to the mesh's. `surface` marks the outermost layer.
-    Raises Problem, starting with `where`, for a body thinner than a particle, one that overlaps itself, or a box that meets none of it.
+    Raises Problem, starting with `where`, for a body thinner than a particle, one that overlaps itself, or a box that
+    meets none of it.
     """
     low, high = mesh.vertices.min(0), mesh.vertices.max(0)
     thickness = 2 * mesh.volume / mesh.area
