@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from solids import ball, box, joined, ring
+from solids import ball, box, hull, joined, ring
 
 from surgisim.problem import Problem
 from surgisim.recordings.fill import fill
@@ -54,6 +54,11 @@ def test_rays_through_edges_and_corners_are_counted_once():
     assert inside[2:5, 2:5, 1].all()
     assert not inside[[0, -1], :, 1].any()
     assert not inside[:, [0, -1], 1].any()
+
+
+def test_a_ray_through_a_peak_enters_once_and_leaves_once():
+    peaks = hull(np.concatenate([np.eye(3), -np.eye(3)]))
+    assert winding(peaks, np.zeros(1), np.zeros(1), np.array([-1.5, -0.5, 0.5, 1.5])).ravel().tolist() == [0, 1, 1, 0]
 
 
 def test_the_hollow_of_a_shell_stays_empty():
