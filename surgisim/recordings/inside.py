@@ -38,7 +38,9 @@ def winding(mesh: Mesh, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarr
         normal = np.cross(b_ - a, c - a)
         along = normal[:, 0] * (x[i] - a[:, 0]) + normal[:, 1] * (y[j] - a[:, 1])
         # A steep face has no exact height; what is lost stays between its lowest and highest corner.
-        height = np.clip(a[:, 2] - along / normal[:, 2], low[face, 2], high[face, 2])
+        upright = normal[:, 2] == 0
+        height = a[:, 2] - np.where(upright, 0.0, along) / np.where(upright, 1.0, normal[:, 2])
+        height = np.clip(height, low[face, 2], high[face, 2])
         np.add.at(steps, (i, j, np.searchsorted(z, height, "left")), turn)
     # A crossing above k points adds to each of them.
     return np.cumsum(steps[:, :, ::-1], axis=2)[:, :, ::-1][:, :, 1:]

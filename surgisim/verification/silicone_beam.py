@@ -32,8 +32,8 @@ FREQUENCY, LOADED = 7.6, 4.3
 """First guesses [Hz]."""
 SWINGS = 3
 """Length of a window of the decay's dependence on amplitude."""
-SPACING, COARSE = 0.006, 0.010
-"""Five and three cells across the beam [m]."""
+SPACING, COARSE = 0.0075, 0.010
+"""Four and three cells across the beam [m]."""
 
 
 def measure(progress, quick: bool = False) -> dict:
@@ -51,7 +51,7 @@ def measure(progress, quick: bool = False) -> dict:
     result["recorded"] = recorded(folder)
     result["coarse"] = COARSE
     result["nu"] = poisson(takes["a"], values, progress, () if quick else (0.30, 0.40, 0.45, 0.48))
-    grids = () if quick else (COARSE, 0.0075, SPACING, 0.005)
+    grids = () if quick else (COARSE, SPACING, 0.006, 0.005)
     result["grids"] = refined(takes["a"], values, progress, grids)
     return result
 
