@@ -27,7 +27,7 @@ NU = 0.45
 FIRST = {"E": MAKERS_E, "nu": NU, "eta": 200.0}
 BEGIN, END = 0.1, 1.6
 """Window of the fits after the release [s]."""
-SECONDS = 1.8
+SECONDS, SHORT = 1.8, 0.9
 FREQUENCY, LOADED = 7.6, 4.3
 """First guesses [Hz]."""
 SWINGS = 3
@@ -49,10 +49,10 @@ def measure(progress, quick: bool = False) -> dict:
     result = {"spacing": spacing, "values": values, "fit": history, "takes": rows, "traces": traces}
     result["drop"] = {"simulated": free.drop, "held": {k: held(r) for k, r in takes.items()}}
     result["recorded"] = recorded(folder)
-    result["coarse"] = COARSE
-    result["nu"] = poisson(takes["a"], values, progress, () if quick else (0.30, 0.40, 0.45, 0.48))
     grids = () if quick else (COARSE, SPACING, 0.006, 0.005)
-    result["grids"] = refined(takes["a"], values, progress, grids)
+    result["grids"] = [study(takes["a"], values, g, NU, progress) for g in grids]
+    several = [] if quick else [(g, nu) for g in (COARSE, 0.006) for nu in (0.30, 0.45, 0.48)]
+    result["nu"] = [study(takes["a"], values, g, nu, progress) for g, nu in several]
     return result
 
 
@@ -128,26 +128,13 @@ def recorded(folder: Path) -> dict:
     return {"swings": SWINGS, "windows": windows, "modes": modes}
 
 
-def poisson(recording, values: dict, progress, several) -> list[dict]:
-    """What nu changes at the coarse grid, E and eta kept; the steps that 0.49 and 0.499 would take."""
-    rows = []
-    for nu in several:
-        progress(nu, 0.5, f"nu {nu}")
-        run = swing(recording, **(values | {"nu": nu}), spacing=COARSE, seconds=1.2)
-        r = read(run.y, FREQUENCY, BEGIN, 1.1)
-        row = {"nu": nu, "frequency": r.frequency, "decay": r.decay, "drop": run.drop}
-        rows.append(row | {"steps_per_second": run.per_frame * recording.fps})
-    return rows
-
-
-def refined(recording, values: dict, progress, several) -> list[dict]:
-    rows = []
-    for spacing in several:
-        progress(spacing, 0, f"grid {1000 * spacing:g} mm")
-        run = swing(recording, **values, spacing=spacing, seconds=1.2)
-        r = read(run.y, FREQUENCY, BEGIN, 1.1)
-        rows.append({"spacing": spacing, "frequency": r.frequency, "decay": r.decay, "drop": run.drop})
-    return rows
+def study(recording, values: dict, spacing: float, nu: float, progress) -> dict:
+    """The beam with E and eta kept, on another grid or with another nu."""
+    progress(0, 1, f"grid {1000 * spacing:g} mm, nu {nu:g}")
+    run = swing(recording, **(values | {"nu": nu}), spacing=spacing, seconds=SHORT)
+    r = read(run.y, FREQUENCY, BEGIN, SHORT - 0.05)
+    found = {"frequency": r.frequency, "decay": r.decay, "drop": run.drop}
+    return {"spacing": spacing, "nu": nu, "steps_per_second": run.per_frame * FPS} | found
 
 
 def read(y: np.ndarray, frequency: float, begin: float = BEGIN, end: float = END, taus: tuple[float, ...] = CREEP):
