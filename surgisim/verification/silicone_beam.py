@@ -51,8 +51,8 @@ def measure(progress, quick: bool = False) -> dict:
     result["recorded"] = recorded(folder)
     grids = () if quick else (COARSE, SPACING, 0.006, 0.005)
     result["grids"] = [study(takes["a"], values, g, NU, progress) for g in grids]
-    several = [] if quick else [(g, nu) for g in (COARSE, 0.006) for nu in (0.30, 0.45, 0.48)]
-    result["nu"] = [study(takes["a"], values, g, nu, progress) for g, nu in several]
+    several = [] if quick else [(nu, held) for held in (None, 0.48) for nu in (0.30, 0.45, 0.48)]
+    result["nu"] = [study(takes["a"], values, COARSE, nu, progress, held) for nu, held in several]
     return result
 
 
@@ -128,13 +128,13 @@ def recorded(folder: Path) -> dict:
     return {"swings": SWINGS, "windows": windows, "modes": modes}
 
 
-def study(recording, values: dict, spacing: float, nu: float, progress) -> dict:
-    """The beam with E and eta kept, on another grid or with another nu."""
+def study(recording, values: dict, spacing: float, nu: float, progress, held: float | None = None) -> dict:
+    """The beam with E and eta kept, on another grid, with another nu or with its end held as for another nu."""
     progress(0, 1, f"grid {1000 * spacing:g} mm, nu {nu:g}")
-    run = swing(recording, **(values | {"nu": nu}), spacing=spacing, seconds=SHORT)
+    run = swing(recording, **(values | {"nu": nu}), spacing=spacing, seconds=SHORT, held_nu=held)
     r = read(run.y, FREQUENCY, BEGIN, SHORT - 0.05)
     found = {"frequency": r.frequency, "decay": r.decay, "drop": run.drop}
-    return {"spacing": spacing, "nu": nu, "steps_per_second": run.per_frame * FPS} | found
+    return {"spacing": spacing, "nu": nu, "held_nu": held or nu, "steps_per_second": run.per_frame * FPS} | found
 
 
 def read(y: np.ndarray, frequency: float, begin: float = BEGIN, end: float = END, taus: tuple[float, ...] = CREEP):

@@ -38,11 +38,13 @@ def swing(
     spacing: float,
     seconds: float,
     begin: tuple[float, float, np.ndarray, float] | None = None,
+    held_nu: float | None = None,
 ) -> Swing:
     """Run the recording's beam on a grid of `spacing` [m].
 
     begin: height above rest [m], speed upwards [m/s], and the settled shape (A, 3) with its drop [m], of which the
-    first state is a multiple; the straight beam at rest where None.
+    first state is a multiple; the straight beam at rest where None. held_nu: the held end is sprung as for this nu,
+    instead of `nu`.
     """
     prepared = prepare(
         recording.body(spacing),
@@ -53,8 +55,9 @@ def swing(
     )
     values = {ELASTIC: {"E": E, "nu": nu}, "newtonian": {"eta": eta}}
     frames = round(seconds * recording.fps) + 1
-    per_frame = prepared.per_frame(values, recording.fps)
-    drive = prepared.drive(recording.motion, values, fps=recording.fps, per_frame=per_frame, frames=frames)
+    held = values if held_nu is None else values | {ELASTIC: {"E": E, "nu": held_nu}}
+    per_frame = max(prepared.per_frame(v, recording.fps) for v in (values, held))
+    drive = prepared.drive(recording.motion, held, fps=recording.fps, per_frame=per_frame, frames=frames)
     if begin is None:
         state = None
     else:
