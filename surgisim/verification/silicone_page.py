@@ -113,8 +113,8 @@ What does not hold:
   {softer / 1000:.0f} kPa (the makers' {MAKERS_E / 1000:.0f} kPa).
 - **The release takes time.** Let go at once, the simulated beam overshoots more than the recorded one (upper left); the
   holder brakes it for the first hundredths of a second, differently in a and b.
-- **The envelope is not quite exponential.** Taken {several} swings at a time, the decay begins a tenth above its mean, then
-  falls a tenth and more below it, then levels, in both takes alike. That is no law of amplitude; whether a second
+- **The envelope is not quite exponential.** Taken {several} swings at a time, the decay begins a tenth above its mean,
+  then falls a tenth and more below it, then levels, in both takes alike. That is no law of amplitude; whether a second
   vibration beats with the first cannot be told here. The frequency rises by one per cent as the swings get small.
 
 {table(["take", "amplitude [mm]", "f [Hz]", "decay [1/s]"], windows)}
