@@ -1,0 +1,152 @@
+"""A recording as a folder: recording.json, rest.ply, fixed.json, tracks.npz; grip.npz, split.json if any.
+
+recording.json  format, name, fps, frames, length_unit (m, cm or mm; of every file), density_kg_m3 or null,
+                gravity_m_s2 [x, y, z] or null, tier; optional starts: "settled" (default) or "released"
+rest.ply        closed triangle mesh of the body at rest
+fixed.json      {"boxes": [{"min": [x, y, z], "max": [x, y, z]}]}: regions of rest space held still
+grip.npz        center_rest (J, 3), radius (J,), position (J, T, 3), active (J, T): translating grips
+tracks.npz      points (K, T, 3), NaN where unseen; visible (K, T); sigma (K,); optional place (K, 3) on the rest body
+split.json      {"fit": [0, t1], "held_out": [t1, T]}
+
+Keys that are not named here are passed over.
+"""
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+
+from surgisim.artifacts.base import save_bytes
+from surgisim.artifacts.motion import Motion
+from surgisim.problem import Problem
+from surgisim.recordings.arrays import arrays
+from surgisim.recordings.facts import boxes_of, facts, split_of
+from surgisim.recordings.mesh import Mesh, closed
+from surgisim.recordings.ply import read_mesh, write_mesh
+from surgisim.recordings.recording import Recording, no_grips
+
+FORMAT = "surgisim-recording/1"
+NAME = "recording.json"
+
+
+def is_recording(path: Path) -> bool:
+    """Whether `path` is a folder of this kind."""
+    return (path / NAME).is_file()
+
+
+def read_recording(folder: Path) -> Recording:
+    """The recording in `folder`, in metres. Raises Problem, naming the file, for anything missing or malformed."""
+    told = facts(folder / NAME, FORMAT)
+    unit, frames = told["unit"], told["frames"]
+    shape = read_mesh(_there(folder / "rest.ply"))
+    mesh = closed(Mesh(shape.vertices * unit, shape.faces), str(folder / "rest.ply"))
+    tracks = arrays(
+        _there(folder / "tracks.npz"),
+        {"points": "KT3", "visible": "KT", "sigma": "K", "place": "K3"},
+        frames,
+        ("place",),
+    )
+    points, visible = tracks["points"] * unit, tracks["visible"].astype(bool)
+    if not np.isfinite(points[visible]).all():
+        k, t = np.argwhere(visible & ~np.isfinite(points).all(-1))[0]
+        raise Problem(
+            f"{folder / 'tracks.npz'}: point {k} is called visible in frame {t}, but its position is not a number. "
+            "Mark it unseen, or give its position."
+        )
+    unseen = np.flatnonzero(~visible.any(1))
+    if len(unseen) and "place" not in tracks:
+        raise Problem(f"{folder / 'tracks.npz'}: point {unseen[0]} is never visible. Leave it out.")
+    if not (np.isfinite(tracks["sigma"]) & (tracks["sigma"] >= 0)).all():
+        raise Problem(f"{folder / 'tracks.npz'}: sigma must be finite and not negative. Give each point's noise.")
+    return Recording(
+        name=told["name"],
+        fps=told["fps"],
+        mesh=mesh,
+        boxes=boxes_of(_there(folder / "fixed.json")) * unit,
+        points=np.where(visible[..., None], points, np.nan).astype(np.float32),
+        visible=visible,
+        sigma=tracks["sigma"].astype(float) * unit,
+        motion=_motion(folder / "grip.npz", frames, unit),
+        density=told["density"],
+        gravity=told["gravity"],
+        tier=told["tier"],
+        starts=told["starts"],
+        place=tracks["place"].astype(float) * unit if "place" in tracks else None,
+        split=split_of(folder / "split.json", frames) if (folder / "split.json").is_file() else None,
+    )
+
+
+def write_recording(recording: Recording, folder: Path) -> None:
+    """Write the folder in metres; its files appear together or not at all."""
+    told = {
+        "format": FORMAT,
+        "name": recording.name,
+        "fps": recording.fps,
+        "frames": recording.frames,
+        "length_unit": "m",
+        "density_kg_m3": recording.density,
+        "gravity_m_s2": None if recording.gravity is None else list(recording.gravity),
+        "tier": recording.tier,
+        "starts": recording.starts,
+    }
+    boxes = [{"min": low.tolist(), "max": high.tolist()} for low, high in recording.boxes]
+    motion = recording.motion
+    tracks = {"points": recording.points.astype(np.float32), "visible": recording.visible, "sigma": recording.sigma}
+    if recording.place is not None:
+        tracks["place"] = recording.place
+    grips = {"center_rest": motion.center_rest, "radius": motion.radius}
+    grips |= {"position": motion.position, "active": motion.active}
+    files = {
+        folder / NAME: _json(told),
+        folder / "rest.ply": write_mesh(recording.mesh),
+        folder / "fixed.json": _json({"boxes": boxes}),
+        folder / "tracks.npz": _npz(tracks),
+        folder / "grip.npz": _npz(grips),
+    }
+    if recording.split is not None:
+        files[folder / "split.json"] = _json({name: list(span) for name, span in recording.split.items()})
+    save_bytes(files)
+
+
+def _motion(path: Path, frames: int, unit: float) -> Motion:
+    if not path.is_file():
+        return no_grips(frames)
+    grips = arrays(path, {"center_rest": "J3", "radius": "J", "position": "JT3", "active": "JT"}, frames)
+    if not len(grips["radius"]):
+        return no_grips(frames)
+    active = grips["active"].astype(bool)
+    position = grips["position"].astype(float) * unit
+    if not np.isfinite(position[active]).all() or not np.isfinite(grips["center_rest"]).all():
+        raise Problem(f"{path}: a grip that holds has a position that is not a number. Give it, or end the grip.")
+    if not (grips["radius"] > 0).all():
+        raise Problem(f"{path}: radius {grips['radius'].min():g} is not positive. Give each grip's radius.")
+    center = grips["center_rest"].astype(float) * unit
+    # Where a grip does not hold, its position does not matter, but the path between must be one.
+    position = np.where(np.isfinite(position), position, _carried_on(position, active, center))
+    sure = np.ones(len(active))
+    return Motion(center, grips["radius"].astype(float) * unit, position, active, sure, source="given")
+
+
+def _carried_on(position: np.ndarray, active: np.ndarray, center: np.ndarray) -> np.ndarray:
+    """Position at the last frame before that is known, the rest centre before all of them, (J, T, 3)."""
+    known = np.isfinite(position).all(-1)
+    latest = np.maximum.accumulate(np.where(known, np.arange(known.shape[1]), -1), axis=1)
+    found = position[np.arange(len(position))[:, None], np.maximum(latest, 0)]
+    return np.where((latest >= 0)[..., None], found, center[:, None])
+
+
+def _there(path: Path) -> Path:
+    if not path.is_file():
+        raise Problem(f"{path}: no such file, but every recording has one. Add it; {NAME} beside it says what this is.")
+    return path
+
+
+def _json(body: dict) -> bytes:
+    return (json.dumps(body, indent=1, allow_nan=False) + "\n").encode()
+
+
+def _npz(fields: dict[str, np.ndarray]) -> bytes:
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **fields)
+    return stream.getvalue()

@@ -1,0 +1,82 @@
+"""Tracked points of a body whose shape, holders and grips are known."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from surgisim.artifacts.base import check
+from surgisim.artifacts.body import Body
+from surgisim.artifacts.motion import Motion
+from surgisim.recordings.fill import fill
+from surgisim.recordings.mesh import Mesh
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """All in one frame of reference [m]; K points in T frames, B boxes, J grips."""
+
+    name: str
+    fps: float
+    """[1/s]"""
+    mesh: Mesh
+    """Closed surface of the body at rest."""
+    boxes: np.ndarray
+    """Lower and upper corner of each region of rest space that is held still [m], (B, 2, 3)."""
+    points: np.ndarray
+    """Where each point was seen [m], (K, T, 3) float32, NaN where it was not."""
+    visible: np.ndarray
+    """(K, T) bool."""
+    sigma: np.ndarray
+    """Nominal noise of each point [m], (K,)."""
+    motion: Motion
+    """The grips; none where nothing was grasped."""
+    density: float | None = None
+    """[kg/m^3]"""
+    gravity: tuple[float, float, float] | None = None
+    """[m/s^2]"""
+    tier: str = "tracks"
+    starts: Literal["settled", "released"] = "settled"
+    """What frame 0 is: the rest shape in equilibrium with gravity, or an unloaded shape that is let go there."""
+    place: np.ndarray | None = None
+    """Where each point sits on the body at rest [m], (K, 3), if not where it is first seen."""
+    split: dict[str, tuple[int, int]] | None = None
+    """Frames `fit` and `held_out`, first and one past the last."""
+
+    def __post_init__(self) -> None:
+        k, t = self.points.shape[:2] if self.points.ndim == 3 else (0, 0)
+        shapes = [self.points.shape, self.visible.shape, self.sigma.shape, self.boxes.shape]
+        check(
+            shapes == [(k, t, 3), (k, t), (k,), (len(self.boxes), 2, 3)],
+            f"recording {self.name}: shapes {shapes} do not fit; (K, T, 3), (K, T), (K,), (B, 2, 3) are wanted.",
+        )
+        check(t > 0 and k > 0, f"recording {self.name}: {k} points in {t} frames; at least one of each is wanted.")
+        grips = self.motion.active.shape[-1]
+        check(grips == t, f"recording {self.name}: the grips have {grips} frames, the points {t}.")
+        check(
+            self.place is None or self.place.shape == (k, 3),
+            f"recording {self.name}: 'place' must give a rest position for each of the {k} points.",
+        )
+
+    @property
+    def frames(self) -> int:
+        return self.points.shape[1]
+
+    def attached(self) -> np.ndarray:
+        """Rest position that each point is taken to follow [m], (K, 3): `place`, or where it is first seen."""
+        if self.place is not None:
+            return self.place
+        first = self.visible.argmax(1)
+        return self.points[np.arange(len(first)), first].astype(float)
+
+    def body(self, spacing: float) -> Body:
+        """Particles for a grid of `spacing` [m], those in the boxes held."""
+        return fill(self.mesh, spacing=spacing, boxes=self.boxes, where=f"recording {self.name}")
+
+
+def no_grips(frames: int) -> Motion:
+    """The motion of a recording in which nothing was grasped."""
+    shape = (0, frames)
+    return Motion(
+        np.zeros((0, 3)), np.zeros(0), np.zeros((*shape, 3)), np.zeros(shape, bool), np.zeros(0), source="none"
+    )
