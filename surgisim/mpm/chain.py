@@ -30,7 +30,7 @@ def by_parameters(
     *,
     held: np.ndarray | None = None,
 ) -> dict[str, dict[str, float | np.ndarray]]:
-    """Law -> parameter -> derivative of the loss by it, per unit; 'center' [1/m], (3,), and 'extent' [1/m] of its place.
+    """Law -> parameter -> derivative of the loss by it; 'center' [1/m], (3,), and 'extent' [1/m] of its place too.
 
     gradient: of a run with these values and places. make_drive: how the run's drive came from the values (the step
     must not change with them); None where the drive does not follow them. held: as for `Prepared.theta`.

@@ -4,7 +4,7 @@
     S(x) = (1 + tanh x) / 2,   e = 0.02 s
 
 p [N/m^3] is the whole force [N] shared out over the law's place, d its direction by yaw and pitch
-(physics/direction.py), t0 its onset and t1 its end [s]. It rises and falls within about one frame of a video.
+(physics/heading.py), t0 its onset and t1 its end [s]. It rises and falls within about one frame of a video.
 A prescribed force, not a contact that follows the tissue; the smooth edge S is our own choice.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
-from surgisim.physics.direction import PITCH, YAW, direction
+from surgisim.physics.heading import PITCH, YAW, heading
 
 EDGE = 0.02
 """How fast it comes and goes [s]."""
@@ -38,7 +38,7 @@ def twin(u, v, q, rho, t, force, x, y, z, onset, end):
 
 
 def columns(force, yaw, pitch, onset, end):
-    x, y, z = direction(yaw, pitch)
+    x, y, z = heading(yaw, pitch)
     return {"force": force, "x": x, "y": y, "z": z, "onset": onset, "end": end}
 
 

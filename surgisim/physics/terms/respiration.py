@@ -3,7 +3,7 @@
     d(t) = a (sin(2 pi t / T + p) - sin p + b (sin(4 pi t / T + p2) - sin p2)) n             [m]
 
 a amplitude [m], T period [s], p and p2 phases of the two harmonics [rad], b the share of the second, n
-direction by yaw and pitch (physics/direction.py). d(0) = 0: the first frame is where positions are counted from.
+direction by yaw and pitch (physics/heading.py). d(0) = 0: the first frame is where positions are counted from.
 The tissue itself starts at rest, though a breathing patient's does not: its first quarter of a second shows a start
 that the recording lacks, unless the run begins from a state that moves with the base.
 Lujan, Larsen, Balter and Ten Haken, A method for incorporating organ motion due to breathing into 3D dose
@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from surgisim.physics.catalogue import Param, Term
-from surgisim.physics.direction import PITCH, YAW, direction
+from surgisim.physics.heading import PITCH, YAW, heading
 
 
 def drive(path, amplitude, period, phase, second, second_phase, yaw, pitch):
@@ -23,7 +23,7 @@ def drive(path, amplitude, period, phase, second, second_phase, yaw, pitch):
     wave = np.sin(angle + phase) - np.sin(phase)
     wave = wave + second * (np.sin(2 * angle + second_phase) - np.sin(second_phase))
     moved = path.path.copy()
-    moved[0] += amplitude * wave[:, None] * np.array(direction(yaw, pitch))
+    moved[0] += amplitude * wave[:, None] * np.array(heading(yaw, pitch))
     return replace(path, path=moved)
 
 

@@ -4,7 +4,7 @@
     f = -w k (T u - s),   |f| <= w c                                  [N/m^3], on held tissue
     where k |T u - s| > c:   s <- s + (|T u - s| - c / k) (T u - s) / |T u - s|
 
-w the share of the bond that is given up [1], n the base's normal by yaw and pitch (physics/direction.py), k and c
+w the share of the bond that is given up [1], n the base's normal by yaw and pitch (physics/heading.py), k and c
 [N/m^4, N/m^3] the base's tangential stiffness [N/m] and the largest friction it bears [N], both of the
 whole base, shared out over what it holds. s [m] is how far tissue has slid: elastic predictor and return to
 Coulomb's cap, with the normal load taken as constant. Friction is counted against the base at rest,
@@ -20,7 +20,7 @@ import numpy as np
 import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
-from surgisim.physics.direction import PITCH, YAW, direction
+from surgisim.physics.heading import PITCH, YAW, heading
 
 
 @wp.func
@@ -66,12 +66,12 @@ def _beyond(u, q, x, y, z):
 
 
 def columns(share, stiffness, cap, yaw, pitch):
-    x, y, z = direction(yaw, pitch)
+    x, y, z = heading(yaw, pitch)
     return {"stiffness": share * stiffness, "cap": share * cap, "x": x, "y": y, "z": z}
 
 
 def drive(path, share, stiffness, cap, yaw, pitch):
-    n = np.array(direction(yaw, pitch))
+    n = np.array(heading(yaw, pitch))
     T = np.eye(3) - np.outer(n, n)
     springs = path.stiffness.copy()
     springs[0] -= share * T @ springs[0] @ T

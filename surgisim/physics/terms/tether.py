@@ -4,7 +4,7 @@
     g(x) = 0 for x < 0,   x^2 / (2 w) for x < w,   x - w/2 beyond     [m],  w = 0.2 mm
 
 u displacement [m]; at rest every band is l [m] long and leads along d (by yaw and pitch, see
-physics/direction.py; straight away from the camera by default); k [N/m^4] is the stiffness of all bands
+physics/heading.py; straight away from the camera by default); k [N/m^4] is the stiffness of all bands
 together [N/m] shared out over the law's place. Moving toward the far end never tightens a band. A long
 band resists only motion away from d, a short one motion to all sides.
 One-sided springs with a slack: Fung, Biomechanics: mechanical properties of living tissues, 2nd ed. (1993),
@@ -17,7 +17,7 @@ import numpy as np
 import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
-from surgisim.physics.direction import PITCH, YAW, direction
+from surgisim.physics.heading import PITCH, YAW, heading
 
 WIDTH = 2e-4
 """Stretch over which a band becomes taut [m]."""
@@ -48,7 +48,7 @@ def twin(u, v, q, rho, t, stiffness, slack, length, x, y, z):
 
 
 def columns(stiffness, slack, length, yaw, pitch):
-    x, y, z = direction(yaw, pitch)
+    x, y, z = heading(yaw, pitch)
     return {"stiffness": stiffness, "slack": slack, "length": length, "x": x, "y": y, "z": z}
 
 
