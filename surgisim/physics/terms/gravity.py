@@ -18,10 +18,7 @@ from surgisim.physics.catalogue import Param, Term
 
 @wp.func
 def force(u: Any, v: Any, q: Any, rho: Any, theta: Any, t: Any):
-    f = u
-    for i in range(3):
-        f[i] = rho * theta[i]
-    return f
+    return rho * wp.vector(theta[0], theta[1], theta[2], dtype=theta.dtype)
 
 
 def twin(u, v, q, rho, t, x, y, z):

@@ -26,10 +26,8 @@ def force(u: Any, v: Any, q: Any, rho: Any, theta: Any, t: Any):
     edge = theta.dtype(EDGE)
     risen = one + wp.tanh((t - theta[4]) / edge)
     left = one + wp.tanh((theta[5] - t) / edge)
-    f = u
-    for i in range(3):
-        f[i] = theta.dtype(0.25) * theta[0] * risen * left * theta[1 + i]
-    return f
+    share = theta.dtype(0.25) * risen * left
+    return (theta[0] * share) * wp.vector(theta[1], theta[2], theta[3], dtype=theta.dtype)
 
 
 def twin(u, v, q, rho, t, force, x, y, z, onset, end):

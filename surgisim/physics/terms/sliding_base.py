@@ -26,11 +26,8 @@ from surgisim.physics.heading import PITCH, YAW, heading
 @wp.func
 def beyond(u: Any, q: Any, theta: Any):
     """T u - s."""
-    along = u[0] * theta[2] + u[1] * theta[3] + u[2] * theta[4]
-    rest = u
-    for i in range(3):
-        rest[i] = u[i] - along * theta[2 + i] - q[i]
-    return rest
+    n = wp.vector(theta[2], theta[3], theta[4], dtype=theta.dtype)
+    return u - wp.dot(u, n) * n - q
 
 
 @wp.func
@@ -41,13 +38,10 @@ def force(u: Any, v: Any, q: Any, rho: Any, theta: Any, t: Any):
 @wp.func
 def advance(F: Any, D: Any, R: Any, u: Any, q: Any, theta: Any, dt: Any):
     stretch = beyond(u, q, theta)
-    length = wp.length(stretch)
-    slid = q
-    if theta[0] * length > theta[1]:
-        share = theta.dtype(1.0) - theta[1] / (theta[0] * length)
-        for i in range(3):
-            slid[i] = q[i] + share * stretch[i]
-    return slid
+    pull = theta[0] * wp.length(stretch)
+    if pull > theta[1]:
+        return q + (theta.dtype(1.0) - theta[1] / pull) * stretch
+    return q
 
 
 def twin(u, v, q, rho, t, stiffness, cap, x, y, z):

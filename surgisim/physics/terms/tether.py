@@ -25,9 +25,7 @@ WIDTH = 2e-4
 
 @wp.func
 def force(u: Any, v: Any, q: Any, rho: Any, theta: Any, t: Any):
-    band = u
-    for i in range(3):
-        band[i] = u[i] - theta[2] * theta[3 + i]
+    band = u - theta[2] * wp.vector(theta[3], theta[4], theta[5], dtype=theta.dtype)
     length = wp.length(band)
     beyond = length - theta[2] - theta[1]
     width = theta.dtype(WIDTH)
