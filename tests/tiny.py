@@ -12,12 +12,12 @@ from surgisim.physics.catalogue import catalogue, defaults
 from surgisim.physics.place import Place
 
 TERMS = catalogue()
-BASE = {"corotated": {"E": 6000.0, "nu": 0.4}, "newtonian": {"eta": 0.5}}
+BASE = {"corotated": {"E": 6000.0, "nu": 0.4}, "newtonian": {"eta": 6.0}}
 DENSITY, STEP, FRAMES, PER_FRAME = 1050.0, 4e-4, 11, 100
 MIDDLE = Place((0.002, 0.001, 0.068), 0.006)
 PULL = pulled(frames=FRAMES, by=(0.0015, 0.0005, -0.002), hold=8, radius=0.006)
 TURN = np.array([[np.cos(2.0), -np.sin(2.0), 0.0], [np.sin(2.0), np.cos(2.0), 0.0], [0.0, 0.0, 1.0]])
-BODY = slab(size=(0.018, 0.018, 0.018), spacing=0.006, per_axis=1)
+BODY = slab(size=(0.018, 0.018, 0.018), spacing=0.006, per_axis=2)
 
 
 @cache
