@@ -33,5 +33,6 @@ TERM = Term(
     force=force,
     twin=twin,
     place="everywhere",
+    rests=False,
     params={"x": component(0.0), "y": component(9.81), "z": component(0.0)},
 )
