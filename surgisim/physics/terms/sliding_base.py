@@ -2,11 +2,11 @@
 
     T = I - n n^T,   K_base <- K_base - w T K_base T                  (what held it before)
     f = -w k (T u - s),   |f| <= w c                                  [N/m^3], on held tissue
-    where k |T u - s| > c:   s <- s + (|T u - s| - c / k) (T u - s) / |T u - s|
+    where k |T u - s| > c:   s <- s + (|T u - s| - c / k) (T u - s) / |T u - s|              [m]
 
 w the share of the bond that is given up [1], n the base's normal by yaw and pitch (physics/heading.py), k and c
 [N/m^4, N/m^3] the base's tangential stiffness [N/m] and the largest friction it bears [N], both of the
-whole base, shared out over what it holds. s [m] is how far tissue has slid: elastic predictor and return to
+whole base, shared out over what it holds. s is how far tissue has slid: elastic predictor and return to
 Coulomb's cap, with the normal load taken as constant. Friction is counted against the base at rest,
 also where another law moves the base.
 Simo and Laursen, An augmented Lagrangian treatment of contact problems involving friction, Computers and
@@ -26,29 +26,29 @@ from surgisim.physics.heading import PITCH, YAW, heading
 @wp.func
 def beyond(u: Any, q: Any, theta: Any):
     """T u - s."""
-    n = wp.vector(theta[2], theta[3], theta[4], dtype=theta.dtype)
+    n = wp.vector(theta[3], theta[4], theta[5], dtype=theta.dtype)
     return u - wp.dot(u, n) * n - q
 
 
 @wp.func
 def force(u: Any, v: Any, q: Any, rho: Any, theta: Any, t: Any):
-    return -theta[0] * beyond(u, q, theta)
+    return (-theta[0] * theta[1]) * beyond(u, q, theta)
 
 
 @wp.func
 def advance(F: Any, D: Any, R: Any, u: Any, q: Any, theta: Any, dt: Any):
     stretch = beyond(u, q, theta)
-    pull = theta[0] * wp.length(stretch)
-    if pull > theta[1]:
-        return q + (theta.dtype(1.0) - theta[1] / pull) * stretch
+    pull = theta[1] * wp.length(stretch)
+    if pull > theta[2]:
+        return q + (theta.dtype(1.0) - theta[2] / pull) * stretch
     return q
 
 
-def twin(u, v, q, rho, t, stiffness, cap, x, y, z):
-    return -stiffness * _beyond(u, q, x, y, z)
+def twin(u, v, q, rho, t, share, stiffness, cap, x, y, z):
+    return -share * stiffness * _beyond(u, q, x, y, z)
 
 
-def twin_advance(F, D, u, q, dt, stiffness, cap, x, y, z):
+def twin_advance(F, D, u, q, dt, share, stiffness, cap, x, y, z):
     stretch = _beyond(u, q, x, y, z)
     pull = stiffness * np.linalg.norm(stretch, axis=-1, keepdims=True)
     return q + np.where(pull > cap, 1 - cap / np.where(pull > 0, pull, 1.0), 0.0) * stretch
@@ -61,7 +61,7 @@ def _beyond(u, q, x, y, z):
 
 def columns(share, stiffness, cap, yaw, pitch):
     x, y, z = heading(yaw, pitch)
-    return {"stiffness": share * stiffness, "cap": share * cap, "x": x, "y": y, "z": z}
+    return {"share": share, "stiffness": stiffness, "cap": cap, "x": x, "y": y, "z": z}
 
 
 def drive(path, share, stiffness, cap, yaw, pitch):
@@ -80,7 +80,7 @@ TERM = Term(
     twin=twin,
     twin_advance=twin_advance,
     columns=columns,
-    spring=lambda stiffness, **_: stiffness,
+    spring=lambda share, stiffness, **_: share * stiffness,
     place="everywhere",
     on="held",
     params={
