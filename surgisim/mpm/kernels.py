@@ -315,6 +315,8 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         theta_bar: wp.array2d(dtype=real),
         rho_bar: wp.array(dtype=real),
         path_bar: wp.array3d(dtype=Vec),
+        hold_bar: wp.array3d(dtype=real),
+        stiffness_bar: wp.array2d(dtype=Mat),
     ):
         p = begin + wp.tid()
         n = clock[1]
@@ -327,11 +329,14 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
             f = f_bar[index[p, k]]
             A -= wp.outer(f, Vec(w[1], w[2], w[3]))
             b += w[0] * f
+        held = anchors.member[p]
         x = Vec()
         y = Vec()
         if wp.static(laws.forces):
             x = carried(u, index, link, slot, p)
             y = carried(v, index, link, slot, p)
+        elif held > 0 and stiffness_bar.shape[1] > 0:
+            x = carried(u, index, link, slot, p)
         before = Memory()
         Q = Memory()
         if wp.static(laws.memory > 0):
@@ -346,14 +351,16 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
             rho_bar[p] = rho_bar[p] + drho
         for m in range(wp.static(laws.columns)):
             theta_bar[p, m] = theta_bar[p, m] + dtheta[m]
-        held = anchors.member[p]
         if held > 0:
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.hold[a, n] > real(0.0):
                     pulled = (volume[p] * anchors.hold[a, n]) * (wp.transpose(anchors.stiffness[a]) * b)
                     dx -= pulled
-                    if path_bar.shape[0] > 0:
-                        wp.atomic_add(path_bar, part, a, n, pulled)
+                    wp.atomic_add(path_bar, part, a, n, pulled)
+                    if stiffness_bar.shape[1] > 0:
+                        away = target(anchors, rest[p], a, n) - x
+                        wp.atomic_add(hold_bar, part, a, n, volume[p] * wp.dot(b, anchors.stiffness[a] * away))
+                        wp.atomic_add(stiffness_bar, part, a, (volume[p] * anchors.hold[a, n]) * wp.outer(b, away))
         if wp.static(scatter):
             for k in range(index.shape[1]):
                 w = link[p, k]

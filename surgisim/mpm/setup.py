@@ -39,10 +39,13 @@ class Prepared:
     places: Mapping[str, Place] = field(default_factory=dict)
     """Laws that act in one place only."""
 
-    def theta(self, values: Values, places: Mapping[str, Place] | None = None) -> np.ndarray:
-        """The laws' columns, one row a particle, (P, M)."""
+    def theta(
+        self, values: Values, places: Mapping[str, Place] | None = None, held: np.ndarray | None = None
+    ) -> np.ndarray:
+        """The laws' columns, one row a particle, (P, M); `held` as for `drive`."""
         places = self.places if places is None else places
-        return rows(choose(self.terms), values, places, self.simulator.rest, self.simulator.volume_p)
+        masks = {"held": self.body.held if held is None else held, "surface": self.body.surface}
+        return rows(choose(self.terms), values, places, self.simulator.rest, self.simulator.volume_p, masks)
 
     def stiffest(self, theta: np.ndarray) -> Values:
         """The largest value of every column on any particle: what bounds the step."""

@@ -58,6 +58,10 @@ class Gradient:
     """By the laws' columns, (P, M)."""
     path: np.ndarray
     """By the anchors' path at every step [1/m], (1 + J, S + 1, 3)."""
+    hold: np.ndarray | None
+    """By the share with which each anchor holds, where it does, (1 + J, S); None if not asked for."""
+    stiffness: np.ndarray | None
+    """By the anchors' springs [s^2], (1 + J, 3, 3); None if not asked for."""
     u: np.ndarray
     """By the first displacement [1/m], (A, 3)."""
     v: np.ndarray
@@ -153,16 +157,25 @@ class Simulator(Nodes):
     # Backward
 
     def gradient(
-        self, theta: np.ndarray, drive: Drive, run: Run, u_bar: np.ndarray, *, first: int = 0, memory_mb: float = 512.0
+        self,
+        theta: np.ndarray,
+        drive: Drive,
+        run: Run,
+        u_bar: np.ndarray,
+        *,
+        first: int = 0,
+        memory_mb: float = 512.0,
+        springs: bool = False,
     ) -> Gradient:
         """Derivative of a loss, given its derivative `u_bar` (T, A, 3) by `run.u`.
 
         memory_mb: what the states of a stretch may take; raises Problem if that is too little for one frame.
+        springs: whether also by the anchors' hold and stiffness.
         """
         per = drive.per_frame
         stretch = self._stretch(per, memory_mb)
         task = self._task(theta, drive, stretch + 1)
-        back = self._back(task, drive)
+        back = self._back(task, drive, springs)
         back.u[0].assign(u_bar[-1].astype(self.real))
         for frame in range(len(run.u) - 1, 0, -1):
             if back.u.numpy().any() or back.v.numpy().any() or back.q.numpy().any():
@@ -175,7 +188,11 @@ class Simulator(Nodes):
                 )
             back.u.zero_()
             back.u[0].assign(total.astype(self.real))
-        return Gradient(self._theta_bar(back), *(a.numpy().astype(float).sum(0) for a in (back.path, back.u, back.v)))
+        path, hold, stiffness, u, v = (
+            a.numpy().astype(float).sum(0) for a in (back.path, back.hold, back.stiffness, back.u, back.v)
+        )
+        held = (hold, stiffness * self.density) if springs else (None, None)
+        return Gradient(self._theta_bar(back), path, *held, u, v)
 
     def _walk_back(self, task: "_Task", back: "_Back", state: State, step: int, count: int, stretch: int) -> None:
         """Back over `count` steps that began at `step` in `state`."""
@@ -200,10 +217,10 @@ class Simulator(Nodes):
             return per
         stretch = allowed // 2
         if stretch < 1 or math.ceil(per / stretch) + stretch + 1 > allowed:
-            least = 2 * (math.isqrt(per) + 2) * state
+            least = math.ceil(20 * (math.isqrt(per) + 2) * state) / 10
             raise Problem(
-                f"adjoint: {memory_mb:.1f} MB hold {allowed} states, too few for the {per} steps of a frame. "
-                f"Allow at least {least:.0f} MB."
+                f"adjoint: {memory_mb:g} MB hold {allowed} states, too few for the {per} steps of a frame. "
+                f"Allow at least {least:.1f} MB."
             )
         return stretch
 
@@ -257,7 +274,7 @@ class Simulator(Nodes):
             forward.insert(1, [wp.launch(self.nodes.gather, len(self.place), links, **launch)])
         return _Task(slots, u, v, q, inputs, forward)
 
-    def _back(self, task: "_Task", drive: Drive) -> "_Back":
+    def _back(self, task: "_Task", drive: Drive, springs: bool) -> "_Back":
         """Device arrays and recorded launches of the way back; nothing is stepped by recording them."""
         s, heavy = self.types, bool(self.kernels.laws.mass)
         f = self._zeros(len(self.place), s.Vec)
@@ -269,10 +286,13 @@ class Simulator(Nodes):
         x, y = (self._zeros(per_particle, s.Vec) for _ in range(2))
         q = self._zeros(self.count if self.width else 1, self.kernels.laws.Memory)
         theta = self._zeros((self.count, self.kernels.columns), s.real)
-        path = self._zeros((len(self.parts), *drive.path.shape[:2]), s.Vec)
+        parts = len(self.parts)
+        path = self._zeros((parts, *drive.path.shape[:2]), s.Vec)
+        hold = self._zeros((parts, *(drive.hold.shape if springs else (0, 0))), s.real)
+        stiffness = self._zeros((parts, len(drive.path) if springs else 0), s.Mat)
         launch = {"device": self.device, "record_cmd": True}
         before = [self.clock, self.mass, self.gravity, s.real(drive.step), task.slots, task.v, u, v, f, m]
-        outs = [f, F, G, x, y, u, v, q, theta, rho, path]
+        outs = [f, F, G, x, y, u, v, q, theta, rho, path, hold, stiffness]
         commands = [
             [wp.launch(tick, 1, [self.clock, -1], **launch)],
             [wp.launch(self.nodes.before, len(self.place), before, **launch)],
@@ -281,7 +301,7 @@ class Simulator(Nodes):
         if not self.scatter:
             links = [self.start, self.entry, self.link, F, G, x, y, u, v]
             commands.append([wp.launch(self.nodes.gather_back, len(self.place), links, **launch)])
-        return _Back(u, v, q, theta, path, m, rho, commands)
+        return _Back(u, v, q, theta, path, hold, stiffness, m, rho, commands)
 
     def _particles(self, kernel, inputs: list, outs: list) -> list:
         """One recorded launch for each share of the particles."""
@@ -353,6 +373,8 @@ class _Back:
     q: wp.array
     theta: wp.array
     path: wp.array
+    hold: wp.array
+    stiffness: wp.array
     mass: wp.array
     rho: wp.array
     commands: list

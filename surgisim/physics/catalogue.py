@@ -90,6 +90,8 @@ class Term:
     """`(**columns) -> largest factor` of a law that multiplies others, for the same purpose."""
     place: Literal["everywhere", "somewhere", "either"] = "either"
     """Where the law may act: on the whole body, in a blob, or both."""
+    on: Literal["body", "held", "surface"] = "body"
+    """Which tissue there it acts on: all of it, what the base holds, or what lies on the seen surface."""
     rests: bool = True
     """Whether tissue at rest is free of its stress and force in the first frame."""
     balanced: bool = False

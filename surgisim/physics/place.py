@@ -30,11 +30,13 @@ def rows(
     places: Mapping[str, Place],
     rest: np.ndarray,
     volume: np.ndarray,
+    masks: Mapping[str, np.ndarray] | None = None,
 ) -> np.ndarray:
     """Columns of all laws at every particle, (P, M).
 
     A column whose parameter has an off value fades to it outside the law's place; a total is shared out over the
-    place, per cubic metre. Raises Problem where a law that needs a place has none, or the place misses the body.
+    place, per cubic metre. masks: 'held' and 'surface', (P,) bool, for laws that act there only.
+    Raises Problem where a law that needs a place has none, or the place misses the body.
     """
     result = []
     for name, term in terms.items():
@@ -46,12 +48,11 @@ def rows(
         if place is not None and term.place == "everywhere":
             raise Problem(f"law '{name}' acts on the whole body, but a place is given for it. Leave the place away.")
         weight = np.ones(len(rest)) if place is None else place.weight(rest)
+        if term.on != "body":
+            weight = weight * (masks or {}).get(term.on, 0)
         shared = float((weight * volume).sum())
         if shared < 1e-6 * float(volume.sum()):
-            raise Problem(
-                f"law '{name}': its place at {np.round(place.center, 4).tolist()} m with extent {place.extent:.4f} m "
-                "holds no tissue. Move it into the body, or enlarge it."
-            )
+            raise Problem(f"law '{name}' finds no tissue to act on: {_where(place, term)}.")
         row = term.row(values[name])
         if term.spread is not None:
             row |= term.spread(rest, **values[name])
@@ -64,3 +65,13 @@ def rows(
             else:
                 result.append(np.broadcast_to(np.asarray(value, float), len(rest)))
     return np.stack(result, -1) if result else np.zeros((len(rest), 0))
+
+
+def _where(place: Place | None, term: Term) -> str:
+    kind = {"body": "", "held": " that the base holds", "surface": " on the seen surface"}[term.on]
+    if place is None:
+        return f"the body has none{kind}. Mark some, or leave the law out"
+    return (
+        f"its place at {np.round(place.center, 4).tolist()} m with extent {place.extent:.4f} m holds none{kind}. "
+        "Move it into the body, or enlarge it"
+    )
