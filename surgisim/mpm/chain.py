@@ -62,7 +62,8 @@ def by_parameters(
 
             def shifted(by, wider=0.0, name=name, of_rows=of_rows) -> float:
                 place = places[name]
-                moved = Place(tuple(np.asarray(place.center, float) + by), place.extent + wider)
+                center = tuple(np.asarray(place.center, float) + by)
+                moved = replace(place, center=center, extent=place.extent + wider)
                 return of_rows(values[name], {**places, name: moved})
 
             own["center"] = np.array([shifted(h * e) - shifted(-h * e) for e in np.eye(3)]) / (2 * h)

@@ -11,17 +11,25 @@ from surgisim.problem import Problem
 
 @dataclass(frozen=True)
 class Place:
-    """A blob exp(-d^2 / (2 extent^2)) around a rest position."""
+    """A blob exp(-d^2 / (2 extent^2)) around a rest position, or all that lies beyond a plane through it.
+
+    Beyond a plane, d the distance along its normal, the share is (1 + tanh(d / extent)) / 2.
+    """
 
     center: tuple[float, float, float]
     """[m]"""
     extent: float
-    """Standard deviation [m]."""
+    """Standard deviation, or how gradually one side passes into the other [m]."""
+    normal: tuple[float, float, float] | None = None
+    """Into the side where the law acts; none for a blob."""
 
     def weight(self, rest: np.ndarray) -> np.ndarray:
         """Share of the law at rest points [m], (P, 3), between 0 and 1, (P,)."""
-        d = np.linalg.norm(np.asarray(rest, float) - np.asarray(self.center, float), axis=1)
-        return np.exp(-0.5 * (d / self.extent) ** 2)
+        arm = np.asarray(rest, float) - np.asarray(self.center, float)
+        if self.normal is not None:
+            way = np.asarray(self.normal, float)
+            return 0.5 * (1 + np.tanh(arm @ (way / np.linalg.norm(way)) / self.extent))
+        return np.exp(-0.5 * ((arm**2).sum(1) / self.extent**2))
 
 
 def rows(
