@@ -1,6 +1,6 @@
 """The laws of a body with their numbers, and the discretisation they were fitted with."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from surgisim.artifacts.base import JsonArtifact, check
@@ -23,6 +23,9 @@ class Physics(JsonArtifact):
 
     form: str = "total"
     """How the method follows the tissue: 'total' (weights fixed at rest) or 'updated' (the paper's)."""
+
+    places: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Law -> {"center" [m], "extent" [m], "normal" or null} for laws that act in one place only."""
 
     UNITS = {"density": "kg/m^3", "gravity": "m/s^2"}
 

@@ -7,6 +7,17 @@ from pydantic import Field
 from surgisim.config.base import Settings
 
 
+class Somewhere(Settings):
+    """Where a law acts that does not act on the whole body."""
+
+    center: tuple[float, float, float]
+    """Middle of the blob, or a point of the plane; camera frame, rest [m]."""
+    extent: float = Field(gt=0)
+    """Standard deviation of the blob, or how gradually the plane's sides pass into each other [m]."""
+    normal: tuple[float, float, float] | None = None
+    """Into the side of a plane where the law acts; none for a blob [-]."""
+
+
 class Estimation(Settings):
     """What is fitted, to what, and for how long."""
 
@@ -16,6 +27,8 @@ class Estimation(Settings):
     """Laws of the body, by their file names in surgisim/physics/terms [-]."""
     start: dict[str, dict[str, float]] = {}
     """Law -> parameter -> value a fit starts from, instead of the law's default [the parameter's unit]."""
+    places: dict[str, Somewhere] = {}
+    """Law -> where it acts, for laws that act in one place; everywhere where not given [-]."""
     fixed: list[str] = []
     """'law.parameter' entries that keep their start value [-]."""
     support: bool = True

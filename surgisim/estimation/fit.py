@@ -1,7 +1,7 @@
 """The whole estimation: support and start, rounds, a field where it pays, then what is known."""
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from surgisim.estimation.support import supports
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
 from surgisim.mpm.setup import Prepared, Values, prepare
 from surgisim.physics.catalogue import choose, columns
+from surgisim.physics.place import Place
 from surgisim.problem import Problem
 
 Say = Callable[[float, float, str], None]
@@ -56,13 +57,20 @@ def estimate(
             "config key 'estimation.form' is 'updated', which has no adjoint, but 'estimation.field_iterations' is "
             f"{settings.field_iterations}. Set field_iterations to 0, or form to 'total'."
         )
+    for law in settings.places:
+        if law not in settings.terms:
+            raise Problem(
+                f"config key 'estimation.places' names '{law}', but the body's laws are {list(settings.terms)}. "
+                "Add it to estimation.terms, or leave its place away."
+            )
+    places = {law: Place(p.center, p.extent, p.normal) for law, p in settings.places.items()}
     wanted = search(settings.terms, settings.start, settings.fixed)
     tracked = tracks.xyz[:, 0][np.isfinite(tracks.xyz[:, 0]).all(1)]
     carried = np.concatenate([scene.mean, tracked]).astype(float)
     bodies = [
         prepare(
             body, tuple(settings.terms), density=settings.density, gravity=settings.gravity, carried=carried,
-            device=settings.device, form=settings.form,
+            device=settings.device, form=settings.form, places=places,
         )
         for _ in range(WORKERS)
     ]  # fmt: skip
@@ -91,7 +99,7 @@ def estimate(
             independent=INDEPENDENT,
         )  # fmt: skip
     values = wanted.values(x)
-    theta, refined = bodies[0].theta(values), None
+    theta, refined = trial.theta(values), None
     if settings.enabled:
         theta, refined = _refined(trial, values, scene, frames, masks, camera, settings, progress)
     trial, final = settle_grip(trial, history, theta, values)
@@ -166,7 +174,7 @@ def _refined(
 ) -> tuple[np.ndarray, Refined | None]:
     """Per-particle parameters where they pay, else the uniform ones."""
     prepared, fitted = trial.bodies[0], trial.fitted
-    theta, names = prepared.theta(values), columns(choose(prepared.terms))
+    theta, names = trial.theta(values), columns(choose(prepared.terms))
     chosen = [names.index(n) for n in settings.field if n in names and n in trial.wanted.names]
     if not settings.field_iterations or not chosen:
         return theta, None
@@ -201,7 +209,12 @@ def _physics(
                 entry |= {"low": known["low"], "high": known["high"], "identifiable": known["told"]}
             terms[law][name] = entry
     grid = {"spacing": prepared.simulator.grid.spacing, "step": step}
-    return Physics(terms, settings.density, list(settings.gravity), grid, grip, settings.form)
+    return Physics(terms, settings.density, list(settings.gravity), grid, grip, settings.form, _told(prepared.places))
+
+
+def _told(places: Mapping[str, Place]) -> dict:
+    """Places as physics.json holds them."""
+    return {law: asdict(place) for law, place in places.items()}
 
 
 def _unfitted(prepared: Prepared, wanted: Search, settings: Estimation, camera: Camera, why: str):

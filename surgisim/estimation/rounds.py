@@ -39,7 +39,7 @@ def settle_grip(trial: Trial, history: list, theta=None, values=None) -> tuple[T
     the start if None. Raises Problem when even the softest does not help.
     """
     body, values = trial.bodies[0], values or trial.wanted.values(trial.wanted.start)
-    theta = body.theta(values) if theta is None else theta
+    theta = trial.theta(values) if theta is None else theta
     for share in [g for g in GRIPS if g <= trial.grip]:
         softer = replace(trial, grip=share)
         try:

@@ -39,18 +39,22 @@ class Trial:
     def drive(self, values: Values, *, frames: int | None = None, safety: float = SAFETY, stiffest=None) -> Drive:
         """The clip's motion at a step that is stable for `stiffest` (or `values`)."""
         body = self.bodies[0]
-        rows = stiffest or body.stiffest(body.theta(values))
+        rows = stiffest or body.stiffest(self.theta(values))
         per_frame = body.per_frame_of(rows, self.fps, safety)
         return self.bodies[0].drive(
             self.motion, values, fps=self.fps, per_frame=per_frame, frames=frames or self.frames, held=self.held,
             grip=self.grip,
         )  # fmt: skip
 
+    def theta(self, values: Values) -> np.ndarray:
+        """The laws' columns under this trial's boundary, (P, M)."""
+        return self.bodies[0].theta(values, held=self.held)
+
     def run(self, x: np.ndarray, worker: int = 0, last: int | None = None) -> Run:
         """Simulate at x, up to frame `last`."""
         values = self.wanted.values(x)
         body = self.bodies[worker]
-        return body.simulator.run(body.theta(values), self.drive(values), last=last)
+        return body.simulator.run(self.theta(values), self.drive(values), last=last)
 
     def residual(self, x: np.ndarray, worker: int = 0, last: int | None = None) -> np.ndarray | None:
         """Weighted misfit of the tracks on fitted frames up to `last`, flat; None where x cannot be simulated."""

@@ -130,6 +130,28 @@ def test_a_stiff_half_is_found_by_the_refinement():
     assert E[right].mean() > 1.15 * E[~right].mean()
 
 
+def test_a_lump_whose_place_is_given_tells_how_stiff_it_is():
+    center, extent = (0.009, 0.0, 0.066), 0.006
+
+    def stiff(rest):
+        return 1 + 2 * np.exp(-0.5 * ((rest - np.array(center)) ** 2).sum(1) / extent**2)
+
+    terms = ["corotated", "newtonian", "stiff_inclusion"]
+    known = {"corotated": {"E": 900.0, "nu": 0.38}, "newtonian": {"eta": 1.2}, "stiff_inclusion": {"s": 1.2}}
+    fixed = ["corotated.E", "corotated.nu", "newtonian.eta"]
+    places = {"stiff_inclusion": {"center": center, "extent": extent}}
+    settings = Estimation(**QUICK, terms=terms, start=known, fixed=fixed, places=places, support=False)
+    _, physics, _ = estimate(*clip(stiff=stiff, noise=1e-5), settings, silent)
+    assert physics.terms["stiff_inclusion"]["s"]["value"] == pytest.approx(3.0, rel=0.1)
+    assert physics.places["stiff_inclusion"]["extent"] == extent
+
+
+def test_a_place_for_a_law_that_the_body_lacks_is_refused():
+    settings = Estimation(**QUICK, places={"tether": {"center": (0.0, 0.0, 0.06), "extent": 0.01}})
+    with pytest.raises(Problem, match=r"estimation\.places' names 'tether'"):
+        estimate(*clip(), settings, silent)
+
+
 def test_a_path_that_would_turn_the_tissue_inside_out_lets_it_slip_and_says_so():
     case = list(clip())
     wild = pulled(frames=T, hold=9, by=(0.0, 0.0, 0.03))
