@@ -14,7 +14,7 @@ def rotation(F: wp.mat33):
         change = wp.ddot(N - R, N - R)
         R = N
         # Newton's error is half the square of its last change.
-        if change < 1.0e-6:
+        if change < 1.0e-7:
             break
     return R
 
