@@ -36,6 +36,7 @@ def shapes(precision: str) -> SimpleNamespace:
         """Which particles are held to which path, and how stiffly."""
 
         member: wp.array(dtype=int)
+        share: wp.array(dtype=real)
         path: wp.array2d(dtype=Vec)
         turn: wp.array2d(dtype=Mat)
         center: wp.array(dtype=Vec)
@@ -278,7 +279,7 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.hold[a, n] > real(0.0):
                     away = target(anchors, rest[p], a, n) - x
-                    pull += (volume[p] * anchors.hold[a, n]) * (anchors.stiffness[a] * away)
+                    pull += (volume[p] * anchors.share[p] * anchors.hold[a, n]) * (anchors.stiffness[a] * away)
         if wp.static(scatter):
             for k in range(index.shape[1]):
                 w = link[p, k]
@@ -354,7 +355,9 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         if held > 0:
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.hold[a, n] > real(0.0):
-                    pulled = (volume[p] * anchors.hold[a, n]) * (wp.transpose(anchors.stiffness[a]) * b)
+                    pulled = (volume[p] * anchors.share[p] * anchors.hold[a, n]) * (
+                        wp.transpose(anchors.stiffness[a]) * b
+                    )
                     dx -= pulled
                     wp.atomic_add(path_bar, part, a, n, pulled)
                     if stiffness_bar.shape[1] > 0:

@@ -14,7 +14,7 @@ from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import ANCHOR, Drive, drive
 from surgisim.mpm.simulator import Simulator
-from surgisim.mpm.stable import check_step, largest_step, wave_speed
+from surgisim.mpm.stable import check_step, largest_step, shear_speed
 from surgisim.mpm.updated import Updated
 from surgisim.physics.catalogue import Numbers, Term, choose, columns, defaults
 from surgisim.physics.place import Place, rows
@@ -79,12 +79,20 @@ class Prepared:
         spacing = self.simulator.grid.spacing
         laws = choose(self.terms)
         base = {n: t.row(values[n]) for n, t in laws.items() if t.energy is not None}
-        rate = wave_speed({n: laws[n] for n in base}, base, self.density) / spacing
+        rate = shear_speed({n: laws[n] for n in base}, base, self.density) / spacing
         motion = replace(motion, radius=np.maximum(motion.radius, LEAST_GRIP * spacing))
         held = self.body.held if held is None else held
         spring = ANCHOR * rate**2
         path = drive(
-            motion, self.body.rest, held, fps=fps, per_frame=per_frame, frames=frames, stiffness=spring, grip=grip
+            motion,
+            self.body.rest,
+            self.body.volume,
+            held,
+            fps=fps,
+            per_frame=per_frame,
+            frames=frames,
+            stiffness=spring,
+            grip=grip,
         )
         for name, term in laws.items():
             if term.drive is not None:

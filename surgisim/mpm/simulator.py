@@ -313,7 +313,7 @@ class Simulator(Nodes):
     def _anchors(self, drive: Drive):
         s = self.types
         anchors = s.Anchors()
-        anchors.member = self._put(drive.member, int)
+        anchors.member, anchors.share = self._put(drive.member, int), self._put(drive.share, s.real)
         anchors.path, anchors.hold = self._put(drive.path, s.Vec), self._put(drive.hold, s.real)
         anchors.turning = int(drive.turn is not None)
         turn = np.zeros((1, 1, 3, 3)) if drive.turn is None else drive.turn

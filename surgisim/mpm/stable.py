@@ -3,6 +3,8 @@
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from surgisim.physics.catalogue import Numbers, Term
 from surgisim.problem import Problem
 
@@ -13,6 +15,24 @@ def wave_speed(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density: 
     rows: every law's columns, the largest of any particle.
     """
     modulus = sum(t.wave_modulus(**rows[n]) for n, t in terms.items() if t.wave_modulus)
+    factor = math.prod(max(1.0, t.stiffens(**rows[n])) for n, t in terms.items() if t.stiffens)
+    return math.sqrt(factor * modulus / density)
+
+
+def shear_speed(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density: float) -> float:
+    """Speed of the shear wave at rest [m/s]: sqrt(mu / rho), summed over the laws that store energy.
+
+    mu is the mean slope of the laws' own stress in a small simple shear along x, y and z.
+    """
+    small, modulus = 1e-5, 0.0
+    for name, term in terms.items():
+        if term.energy is not None and term.stress is not None:
+            for a in range(3):
+                F = np.eye(3)
+                F[a, a - 1] = small
+                bent = term.cauchy(F, np.zeros((3, 3)), np.zeros(max(1, term.memory)), 0.0, rows[name])
+                rest = term.cauchy(np.eye(3), np.zeros((3, 3)), np.zeros(max(1, term.memory)), 0.0, rows[name])
+                modulus += float(bent[a, a - 1] - rest[a, a - 1]) / small / 3
     factor = math.prod(max(1.0, t.stiffens(**rows[n])) for n, t in terms.items() if t.stiffens)
     return math.sqrt(factor * modulus / density)
 

@@ -8,22 +8,21 @@ lambda/2 (ln J)^2 is no longer convex beyond J = e, this one is polyconvex; to s
 Ciarlet, Mathematical Elasticity I (1988), section 4.10; Wriggers, Nonlinear Finite Element Methods (2008), section 3.3.1.
 """
 
+from typing import Any
+
 import numpy as np
 import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
-from surgisim.physics.terms.corotated import lame, wave_modulus
-
-Theta = wp.types.vector(2, float)
+from surgisim.physics.terms.corotated import lame, moduli, wave_modulus
 
 
 @wp.func
-def stress(F: wp.mat33, D: wp.mat33, theta: Theta):
-    mu = theta[0] / (2.0 * (1.0 + theta[1]))
-    lam = theta[0] * theta[1] / ((1.0 + theta[1]) * (1.0 - 2.0 * theta[1]))
+def stress(F: Any, D: Any, theta: Any):
+    mu, lam = moduli(theta)
     J = wp.determinant(F)
-    one = wp.identity(n=3, dtype=float)
-    return (mu * (F * wp.transpose(F) - one) + 0.5 * lam * (J * J - 1.0) * one) / J
+    one = wp.identity(n=3, dtype=F.dtype)
+    return (mu * (F * wp.transpose(F) - one) + F.dtype(0.5) * lam * (J * J - F.dtype(1.0)) * one) / J
 
 
 def twin(F, D, E, nu):

@@ -14,6 +14,9 @@ from surgisim.phantom.block import Grip, Shape
 from surgisim.phantom.elements import CORNERS
 from surgisim.problem import Problem
 
+CUBE = 0.7
+"""Half edge of the cube that the innermost shells resemble, over the ball's radius."""
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -48,7 +51,9 @@ def mesh(shape: Shape, grips: tuple[Grip, ...], spacing: float) -> Mesh:
         gripped.append(inside.ravel())
     number = np.arange(index[..., 0].size).reshape(counts + 1)
     corner = ((CORNERS + 1) // 2).astype(int)
-    cells = np.stack([number[i : i + counts[0], j : j + counts[1], k : k + counts[2]].ravel() for i, j, k in corner], -1)
+    cells = np.stack(
+        [number[i : i + counts[0], j : j + counts[1], k : k + counts[2]].ravel() for i, j, k in corner], -1
+    )
     return Mesh(
         points=shape.place(_bent(shape, flat.reshape(-1, 3))),
         uv=flat[..., :2].reshape(-1, 2),
@@ -69,7 +74,9 @@ def _bent(shape: Shape, flat: np.ndarray) -> np.ndarray:
 def _blown_up(shape, grip, others, index, edge, counts, flat):
     """`flat` with the lattice around one grip bent into a ball, and which nodes are in or on it."""
     middle = np.append(np.rint((grip.uv - shape.low) / edge[:2]).astype(int), 0)
-    clear = min([np.abs(o.uv - grip.uv).max() * r for o in others for r in [grip.radius / (grip.radius + o.radius)]] + [1.0])
+    clear = min(
+        [np.abs(o.uv - grip.uv).max() * r for o in others for r in [grip.radius / (grip.radius + o.radius)]] + [1.0]
+    )
     reach = min(1.7 * grip.radius, clear, 0.9 * shape.thickness)
     n = max(1, round(0.75 * grip.radius / edge.mean()))
     outer = max(n + 1, round(reach / edge.mean()))
@@ -97,7 +104,10 @@ def _blown_up(shape, grip, others, index, edge, counts, flat):
     on_skin = center + length[:, None] * ray
     rim = np.append(shape.low, 0.0) + (middle + off[near] * outer / m) * edge
     share = (m - n) / (outer - n)
+    # Inside, shells turn from cubes into spheres, so that only the outermost have flat angles.
+    cube = off[near] / m * np.linalg.norm(on_skin - center, axis=-1, keepdims=True) * CUBE
+    inner = center + m / n * (m / n * (on_skin - center) + (1 - m / n) * cube)
     bent = flat.copy()
-    bent[near] = np.where(m <= n, center + (on_skin - center) * m / n, (1 - share) * on_skin + share * rim)
+    bent[near] = np.where(m <= n, inner, (1 - share) * on_skin + share * rim)
     bent[tuple(middle)] = center
     return bent, shell <= n

@@ -36,25 +36,29 @@ def prepared(scene: Scene, spacing: float, probes: np.ndarray) -> tuple[Prepared
 
 
 def body(scene: Scene, spacing: float) -> Body:
-    """The block as columns of particles, 8 a cell; tissue in the first half cell below its base is held."""
+    """The block as columns of particles, 8 a cell; the last layer, of half the thickness, lies on the base and is held.
+
+    A held particle is pinned where it is, so the plane that does not move runs through the held layer's centres.
+    """
     shape, step = scene.shape, spacing / 2
     count = np.rint((shape.high - shape.low) / step).astype(int)
-    axes = [low + (np.arange(n) + 0.5) * (high - low) / n for low, high, n in zip(shape.low, shape.high, count, strict=True)]
+    axes = [a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in zip(shape.low, shape.high, count, strict=True)]
     uv = np.stack(np.meshgrid(*axes), -1).reshape(-1, 2)
     top = -shape.relief(uv)
-    layers = np.maximum(np.rint((shape.thickness - top) / step).astype(int), 1)
-    owner = np.repeat(np.arange(len(uv)), layers)
-    layer = np.arange(len(owner)) - np.repeat(np.cumsum(layers) - layers, layers)
-    thick = ((shape.thickness - top) / layers)[owner]
-    local = np.concatenate([uv[owner], (top[owner] + (layer + 0.5) * thick)[:, None]], 1)
+    whole = np.maximum(np.rint((shape.thickness - top) / step - 0.5).astype(int), 1)
+    thick = (shape.thickness - top) / (whole + 0.5)
+    owner = np.repeat(np.arange(len(uv)), whole + 1)
+    layer = np.arange(len(owner)) - np.repeat(np.cumsum(whole + 1) - whole - 1, whole + 1)
+    held = layer == whole[owner]
+    local = np.concatenate([uv[owner], (top[owner] + (layer + 0.5) * thick[owner])[:, None]], 1)
     area = float(np.prod((shape.high - shape.low) / count))
     rest = shape.place(local)
     return Body(
         rest=rest.astype(np.float32),
-        volume=(thick * area).astype(np.float32),
+        volume=(thick[owner] * area * np.where(held, 0.5, 1.0)).astype(np.float32),
         color=np.full(rest.shape, 0.5, np.float32),
         surface=layer == 0,
-        held=layer == layers[owner] - 1,
+        held=held,
         spacing=spacing,
     )
 

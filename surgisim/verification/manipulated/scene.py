@@ -76,10 +76,8 @@ def invent(seed: int) -> Scene:
     rng = np.random.default_rng([seed, *b"manipulation"])
     size = rng.uniform([0.058, 0.040], [0.062, 0.046])
     E = 1e3 * math.exp(rng.uniform(math.log(2), math.log(8)))
-    law = Law(E, rng.uniform(0.40, 0.47), E * rng.uniform(2e-3, 6e-3), DENSITY)
-    shape = Shape(
-        np.array([0.0, 0.0, 0.07]), _axes(rng), -size / 2, size / 2, rng.uniform(0.014, 0.018), _waves(rng)
-    )
+    law = Law(E, rng.uniform(0.40, 0.47), E * rng.uniform(1e-3, 3e-3), DENSITY)
+    shape = Shape(np.array([0.0, 0.0, 0.07]), _axes(rng), -size / 2, size / 2, rng.uniform(0.014, 0.018), _waves(rng))
     radii = rng.uniform(4.5e-3, 6.5e-3, 2)
     side = rng.choice([-1.0, 1.0])
     first = np.array([side * rng.uniform(0.006, 0.010), rng.uniform(-0.005, 0.005)])
@@ -104,7 +102,11 @@ def _axes(rng: np.random.Generator) -> np.ndarray:
 
 def _waves(rng: np.random.Generator, count: int = 10) -> np.ndarray:
     """Gentle hills of 0.6-1.4 mm RMS, as the phantom's."""
-    relief, length, heading = rng.uniform(0.6e-3, 1.4e-3), rng.uniform(0.016, 0.045, count), rng.uniform(0, 2 * np.pi, count)
+    relief, length, heading = (
+        rng.uniform(0.6e-3, 1.4e-3),
+        rng.uniform(0.016, 0.045, count),
+        rng.uniform(0, 2 * np.pi, count),
+    )
     height = length / np.sqrt(np.sum(length**2) / 2) * relief
     number = (2 * np.pi / length)[:, None] * np.stack([np.cos(heading), np.sin(heading)], 1)
     return np.concatenate([number, rng.uniform(0, 2 * np.pi, count)[:, None], height[:, None]], 1)
