@@ -14,6 +14,8 @@ edge of what is held: a rigid hold reaches beyond it by a share of a cell, a sof
 stiffness the two make up for each other, so that the held volume acts as large as it is (docs/verification.md,
 manipulation). Shear, because tissue that cannot be squeezed flows around a grip. It has no damper: at the held boundary
 that would drain every wave that arrives there."""
+SHARP_ANCHOR = 90.0
+"""The same where the displacement may bend at a grip's skin (kink.py), which leaves less to make up for."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,8 @@ def drive(
 ) -> Drive:
     """The boundary condition of a replay of `motion` on particles `rest` [m], (P, 3), of `volume` [m^3], (P,).
 
-    A particle at the skin of a grip's ball is held by the share of it that lies inside. stiffness: spring of the anchors per unit of mass [1/s^2]; `grip` is the share of it that instruments get.
-    Between frames the path is a monotone cubic (Fritsch and Carlson, 1980), so the instrument does
+    A particle at the skin of a grip's ball is held by the share of it that lies inside. stiffness: spring of the
+    anchors per unit of mass [1/s^2]; `grip` is the share of it that instruments get. Between frames the path is a monotone cubic (Fritsch and Carlson, 1980), so the instrument does
     not jerk at every frame; before and after its active frames a grip holds nothing.
     Raises Problem if a grip holds no particle, or more than 31 grips are asked for.
     """

@@ -81,6 +81,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         clock: wp.array(dtype=int),
         mass: wp.array(dtype=real),
         gravity: Vec,
+        plain: int,
         dt: real,
         slots: int,
         force: wp.array2d(dtype=Vec),
@@ -95,7 +96,9 @@ def node_kernels(precision: str) -> SimpleNamespace:
         for part in range(force.shape[0]):
             total += force[part, i]
             force[part, i] = Vec()
-        speed = v[here, i] + dt * (total / mass[i] + gravity)
+        speed = v[here, i] + dt * (total / mass[i])
+        if i < plain:
+            speed += dt * gravity
         v[there, i] = speed
         u[there, i] = u[here, i] + dt * speed
 
@@ -104,6 +107,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         clock: wp.array(dtype=int),
         mass: wp.array(dtype=real),
         gravity: Vec,
+        plain: int,
         dt: real,
         slots: int,
         v: wp.array2d(dtype=Vec),
@@ -123,7 +127,9 @@ def node_kernels(precision: str) -> SimpleNamespace:
         f_bar[i] = (dt / mass[i]) * total
         if m_bar.shape[0] > 0:
             n = clock[0]
-            gained = v[(n + 1) % slots, i] - v[n % slots, i] - dt * gravity
+            gained = v[(n + 1) % slots, i] - v[n % slots, i]
+            if i < plain:
+                gained -= dt * gravity
             m_bar[i] = m_bar[i] - wp.dot(total, gained) / mass[i]
 
     @wp.kernel(module="unique", enable_backward=False)

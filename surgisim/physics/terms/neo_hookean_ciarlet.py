@@ -1,11 +1,11 @@
-"""Compressible neo-Hookean elasticity with Ciarlet's volumetric energy: rubber that resists swelling and squeezing alike.
+"""Compressible neo-Hookean elasticity with Ciarlet's volumetric energy, as the phantom's finite elements have it.
 
     psi = mu/2 (tr(F^T F) - 3 - 2 ln J) + lambda/4 (J^2 - 1 - 2 ln J)   [J/m^3]
     sigma = (mu (F F^T - I) + lambda/2 (J^2 - 1) I) / J                 [Pa]
 
-J = det F, mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)). Against `neo_hookean`, whose
-lambda/2 (ln J)^2 is no longer convex beyond J = e, this one is polyconvex; to second order in strain both agree.
-Ciarlet, Mathematical Elasticity I (1988), section 4.10; Wriggers, Nonlinear Finite Element Methods (2008), section 3.3.1.
+J = det F, mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)). To second order in strain it is
+`neo_hookean`, whose lambda/2 (ln J)^2 is not convex beyond J = e; this one is polyconvex.
+Ciarlet, Mathematical Elasticity I (1988), section 4.10; Wriggers, Nonlinear Finite Element Methods (2008), chapter 3.
 """
 
 from typing import Any

@@ -20,9 +20,9 @@ def follow(
     progress: Callable[[float, float, str], None] = lambda done, total, text: None,
     frames: int | None = None,
 ) -> np.ndarray:
-    """Displacement of surface points `probes` (u, v) [m], (K, 2), at `scene.clock()`, (T, K, 3), with edges of `spacing`.
+    """Displacement [m] of surface points `probes` (u, v) [m], (K, 2), at `scene.clock()`, (T, K, 3).
 
-    Raises Problem when an element turns inside out.
+    spacing: edge of the elements [m]; frames: stop after so many. Raises Problem when an element turns inside out.
     """
     first, second = scene.holds
     block = mesh(scene.shape, (first.grip, second.grip), spacing)

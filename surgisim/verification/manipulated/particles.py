@@ -19,7 +19,10 @@ def follow(
     progress: Callable[[float, float, str], None] | None = None,
     frames: int | None = None,
 ) -> np.ndarray:
-    """Displacement of surface points `probes` (u, v) [m], (K, 2), at `scene.clock()`, (T, K, 3), on a grid of `spacing`."""
+    """Displacement [m] of surface points `probes` (u, v) [m], (K, 2), at `scene.clock()`, (T, K, 3).
+
+    spacing: of the grid [m]; frames: stop after so many.
+    """
     made, values = prepared(scene, spacing, probes)
     per = made.per_frame(values, FPS * FINE)
     path = made.drive(motion(scene, frames), values, fps=FPS * FINE, per_frame=per)
@@ -31,7 +34,7 @@ def follow(
 def prepared(scene: Scene, spacing: float, probes: np.ndarray) -> tuple[Prepared, Values]:
     law = scene.law
     values = {TERMS[0]: {"E": law.E, "nu": law.nu}, TERMS[1]: {"eta": law.eta}}
-    made = prepare(body(scene, spacing), TERMS, density=DENSITY, carried=scene.shape.upper(probes))
+    made = prepare(body(scene, spacing), TERMS, density=DENSITY, carried=scene.shape.upper(probes), grips=motion(scene))
     return made, values
 
 
