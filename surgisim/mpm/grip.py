@@ -66,7 +66,8 @@ def drive(
     """The boundary condition of a replay of `motion` on particles `rest` [m], (P, 3), of `volume` [m^3], (P,).
 
     A particle at the skin of a grip's ball is held by the share of it that lies inside. stiffness: spring of the
-    anchors per unit of mass [1/s^2]; `grip` is the share of it that instruments get. Between frames the path is a monotone cubic (Fritsch and Carlson, 1980), so the instrument does
+    anchors per unit of mass [1/s^2]; `grip` is the share of it that instruments get.
+    Between frames the path is a monotone cubic (Fritsch and Carlson, 1980), so the instrument does
     not jerk at every frame; before and after its active frames a grip holds nothing.
     Raises Problem if a grip holds no particle, or more than 31 grips are asked for.
     """
