@@ -368,8 +368,9 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
                     wp.atomic_add(path_bar, part, a, n, pulled)
                     if stiffness_bar.shape[1] > 0:
                         away = target(anchors, rest[p], a, n) - x
-                        wp.atomic_add(hold_bar, part, a, n, volume[p] * wp.dot(b, anchors.stiffness[a] * away))
-                        wp.atomic_add(stiffness_bar, part, a, (volume[p] * anchors.hold[a, n]) * wp.outer(b, away))
+                        gain = volume[p] * anchors.share[p]
+                        wp.atomic_add(hold_bar, part, a, n, gain * wp.dot(b, anchors.stiffness[a] * away))
+                        wp.atomic_add(stiffness_bar, part, a, (gain * anchors.hold[a, n]) * wp.outer(b, away))
         if wp.static(scatter):
             for k in range(index.shape[1]):
                 w = link[p, k]
