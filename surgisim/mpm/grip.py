@@ -8,10 +8,14 @@ from scipy.interpolate import PchipInterpolator
 from surgisim.artifacts.motion import Motion
 from surgisim.problem import Problem
 
-ANCHOR = 4.0
-"""Spring of an anchor, in units of (wave speed / spacing)^2 per unit of mass: as stiff as a cell of the tissue
-itself, so that its own compliance shrinks with the grid. It has no damper: at the held boundary that would
-drain every wave that arrives there."""
+ANCHOR = 56.0
+"""Spring of an anchor, in units of (shear wave speed / spacing)^2 per unit of mass. A spline cannot bend sharply at the
+edge of what is held: a rigid hold reaches beyond it by a share of a cell, a soft one lets the edge slip. At this
+stiffness the two make up for each other, so that the held volume acts as large as it is (docs/verification.md,
+manipulation). Shear, because tissue that cannot be squeezed flows around a grip. It has no damper: at the held boundary
+that would drain every wave that arrives there."""
+SHARP_ANCHOR = 90.0
+"""The same where the displacement may bend at a grip's skin (kink.py), which leaves less to make up for."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +24,8 @@ class Drive:
 
     member: np.ndarray
     """Bit a is set where anchor a holds the particle, (P,) int32."""
+    share: np.ndarray
+    """Share of the particle's volume that is held, (P,)."""
     path: np.ndarray
     """Displacement of each anchor at every step and after the last [m], (1 + J, S + 1, 3)."""
     hold: np.ndarray
@@ -48,6 +54,7 @@ class Drive:
 def drive(
     motion: Motion,
     rest: np.ndarray,
+    volume: np.ndarray,
     held: np.ndarray,
     *,
     fps: float,
@@ -56,9 +63,10 @@ def drive(
     grip: float = 1.0,
     frames: int | None = None,
 ) -> Drive:
-    """The boundary condition of a replay of `motion` on particles `rest` [m], (P, 3).
+    """The boundary condition of a replay of `motion` on particles `rest` [m], (P, 3), of `volume` [m^3], (P,).
 
-    stiffness: spring of the anchors per unit of mass [1/s^2]; `grip` is the share of it that instruments get.
+    A particle at the skin of a grip's ball is held by the share of it that lies inside. stiffness: spring of the
+    anchors per unit of mass [1/s^2]; `grip` is the share of it that instruments get.
     Between frames the path is a monotone cubic (Fritsch and Carlson, 1980), so the instrument does
     not jerk at every frame; before and after its active frames a grip holds nothing.
     Raises Problem if a grip holds no particle, or more than 31 grips are asked for.
@@ -68,21 +76,25 @@ def drive(
     steps, step = (frames - 1) * per_frame, 1.0 / fps / per_frame
     if grips > 30:
         raise Problem(f"motion: {grips} grips, but at most 30 can be simulated at once. Keep the ones that matter.")
-    member = held.astype(np.int32)
+    member, share = held.astype(np.int32), held.astype(float)
+    size = np.cbrt(volume)
     path = np.zeros((1 + grips, steps + 1, 3))
     active = np.zeros((1 + grips, steps), bool)
     active[0] = True
     clock = np.arange(steps + 1) / per_frame
     for j in range(grips):
-        near = np.linalg.norm(rest - motion.center_rest[j], axis=1) <= motion.radius[j]
+        away = np.linalg.norm(rest - motion.center_rest[j], axis=1)
+        inside = np.clip(0.5 + (motion.radius[j] - away) / size, 0.0, 1.0)
+        near = inside > 0
         if not near.any():
             where = np.round(motion.center_rest[j], 4).tolist()
-            gap = np.linalg.norm(rest - motion.center_rest[j], axis=1).min()
+            gap = away.min()
             raise Problem(
                 f"motion: grip {j} at {where} m with radius {motion.radius[j]:.4f} m lies outside the body; "
                 f"the nearest tissue is {gap:.4f} m away. Move the grip, or enlarge its radius."
             )
         member |= near.astype(np.int32) << (1 + j)
+        share = np.maximum(share, inside)
         offset = motion.position[j] - motion.center_rest[j]
         at = np.minimum(clock, len(offset) - 1)
         path[1 + j] = PchipInterpolator(np.arange(len(offset)), offset)(at) if len(offset) > 1 else offset[0]
@@ -93,4 +105,4 @@ def drive(
     springs = stiffness * np.concatenate([[1.0], np.full(grips, grip)])
     center = np.concatenate([rest[held].mean(0, keepdims=True) if held.any() else np.zeros((1, 3)), motion.center_rest])
     spring = springs[:, None, None] * np.eye(3)
-    return Drive(member, path, active.astype(float), step, per_frame, spring, center)
+    return Drive(member, share, path, active.astype(float), step, per_frame, spring, center)

@@ -36,6 +36,7 @@ def shapes(precision: str) -> SimpleNamespace:
         """Which particles are held to which path, and how stiffly."""
 
         member: wp.array(dtype=int)
+        share: wp.array(dtype=real)
         path: wp.array2d(dtype=Vec)
         turn: wp.array2d(dtype=Mat)
         center: wp.array(dtype=Vec)
@@ -80,6 +81,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         clock: wp.array(dtype=int),
         mass: wp.array(dtype=real),
         gravity: Vec,
+        plain: int,
         dt: real,
         slots: int,
         force: wp.array2d(dtype=Vec),
@@ -94,7 +96,9 @@ def node_kernels(precision: str) -> SimpleNamespace:
         for part in range(force.shape[0]):
             total += force[part, i]
             force[part, i] = Vec()
-        speed = v[here, i] + dt * (total / mass[i] + gravity)
+        speed = v[here, i] + dt * (total / mass[i])
+        if i < plain:
+            speed += dt * gravity
         v[there, i] = speed
         u[there, i] = u[here, i] + dt * speed
 
@@ -103,6 +107,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         clock: wp.array(dtype=int),
         mass: wp.array(dtype=real),
         gravity: Vec,
+        plain: int,
         dt: real,
         slots: int,
         v: wp.array2d(dtype=Vec),
@@ -122,7 +127,9 @@ def node_kernels(precision: str) -> SimpleNamespace:
         f_bar[i] = (dt / mass[i]) * total
         if m_bar.shape[0] > 0:
             n = clock[0]
-            gained = v[(n + 1) % slots, i] - v[n % slots, i] - dt * gravity
+            gained = v[(n + 1) % slots, i] - v[n % slots, i]
+            if i < plain:
+                gained -= dt * gravity
             m_bar[i] = m_bar[i] - wp.dot(total, gained) / mass[i]
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -278,7 +285,7 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.hold[a, n] > real(0.0):
                     away = target(anchors, rest[p], a, n) - x
-                    pull += (volume[p] * anchors.hold[a, n]) * (anchors.stiffness[a] * away)
+                    pull += (volume[p] * anchors.share[p] * anchors.hold[a, n]) * (anchors.stiffness[a] * away)
         if wp.static(scatter):
             for k in range(index.shape[1]):
                 w = link[p, k]
@@ -354,13 +361,16 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         if held > 0:
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.hold[a, n] > real(0.0):
-                    pulled = (volume[p] * anchors.hold[a, n]) * (wp.transpose(anchors.stiffness[a]) * b)
+                    pulled = (volume[p] * anchors.share[p] * anchors.hold[a, n]) * (
+                        wp.transpose(anchors.stiffness[a]) * b
+                    )
                     dx -= pulled
                     wp.atomic_add(path_bar, part, a, n, pulled)
                     if stiffness_bar.shape[1] > 0:
                         away = target(anchors, rest[p], a, n) - x
-                        wp.atomic_add(hold_bar, part, a, n, volume[p] * wp.dot(b, anchors.stiffness[a] * away))
-                        wp.atomic_add(stiffness_bar, part, a, (volume[p] * anchors.hold[a, n]) * wp.outer(b, away))
+                        gain = volume[p] * anchors.share[p]
+                        wp.atomic_add(hold_bar, part, a, n, gain * wp.dot(b, anchors.stiffness[a] * away))
+                        wp.atomic_add(stiffness_bar, part, a, (gain * anchors.hold[a, n]) * wp.outer(b, away))
         if wp.static(scatter):
             for k in range(index.shape[1]):
                 w = link[p, k]

@@ -6,18 +6,27 @@ from scipy import sparse
 from surgisim.mpm.cut import Cut
 from surgisim.mpm.extension import extension
 from surgisim.mpm.grid import Grid
+from surgisim.mpm.kink import Ball, Kinks
 
 
 class Nodes:
-    """Solid nodes `place` (A,) of a grid, and the rule that every other node near the body follows."""
+    """Solid nodes `place` (A,) of a grid, and the rule that every other node near the body follows.
 
-    def __init__(self, grid: Grid, rest: np.ndarray, volume: np.ndarray, cut: Cut | None) -> None:
+    The last `kinks.count` of them belong to the functions of gripped balls and stand at no place of the grid (-1).
+    """
+
+    def __init__(
+        self, grid: Grid, rest: np.ndarray, volume: np.ndarray, cut: Cut | None, balls: tuple[Ball, ...] = ()
+    ) -> None:
         """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,)."""
         self.grid, self.cut = grid, cut
         nodes, weight, _ = self.stencil(rest)
         sides = 1 if cut is None else 2
         share = np.bincount(nodes.ravel(), (weight * volume[:, None]).ravel(), sides * grid.count)
         self.place, self.rule = extension(grid, share, cut)
+        index, link = self._spline_links(rest)
+        self.kinks = Kinks(balls, grid.spacing, len(self.place), index, link, rest, volume)
+        self.place = np.concatenate([self.place, np.full(self.kinks.count, -1, self.place.dtype)])
 
     def stencil(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """As Grid.stencil; a link across the cut leads to the node's copy on the point's own side, N further on."""
@@ -32,6 +41,9 @@ class Nodes:
 
         Rows shorter than the longest are padded with links of weight zero to their first node.
         """
+        return self.kinks.added(points, *self._spline_links(points))
+
+    def _spline_links(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         nodes, weight, gradient = self.stencil(points)
         rows = np.repeat(np.arange(len(nodes)), 27)
         size = (len(nodes), self.rule.shape[0])
@@ -61,10 +73,22 @@ class Nodes:
         return sparse.csr_matrix((link[..., 0].ravel(), (rows, index.ravel())), (len(index), len(self.place)))
 
     def displaced(self, u: np.ndarray) -> np.ndarray:
-        """Nodal displacement [m], (..., N, 3) or (..., 2 N, 3) once cut, of every node that follows the body."""
-        flat = np.moveaxis(u.astype(float), -2, 0).reshape(len(self.place), -1)
+        """Nodal displacement [m], (..., N, 3) or (..., 2 N, 3) once cut, of every node that follows the body.
+
+        The kinks at gripped balls are no nodes of the grid and are left out; `carry` has them.
+        """
+        plain = self.rule.shape[1]
+        flat = np.moveaxis(u[..., :plain, :].astype(float), -2, 0).reshape(plain, -1)
         return np.moveaxis((self.rule @ flat).reshape(-1, *u.shape[:-2], 3), 0, -2)
 
     def inherited(self, other: "Nodes", u: np.ndarray) -> np.ndarray:
-        """Nodal values of `other`, (A', 3), over these nodes, (A, 3): both copies start as the node did."""
-        return other.displaced(u)[self.place % self.grid.count].astype(u.dtype)
+        """Nodal values of `other`, (A', 3), over these nodes, (A, 3): both copies start as the node did.
+
+        Kinks keep their values where both have the same balls, and begin at zero elsewhere.
+        """
+        plain = self.rule.shape[1]
+        new = np.zeros((len(self.place), 3), u.dtype)
+        new[:plain] = other.displaced(u)[self.place[:plain] % self.grid.count]
+        if len(other.kinks.balls) == len(self.kinks.balls):
+            new[plain:] = u[other.rule.shape[1] :]
+        return new

@@ -12,9 +12,10 @@ from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.physics import Physics
 from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
-from surgisim.mpm.grip import ANCHOR, Drive, drive
+from surgisim.mpm.grip import ANCHOR, SHARP_ANCHOR, Drive, drive
+from surgisim.mpm.kink import Ball
 from surgisim.mpm.simulator import Simulator
-from surgisim.mpm.stable import check_step, largest_step, wave_speed
+from surgisim.mpm.stable import check_step, largest_step, shear_speed
 from surgisim.mpm.updated import Updated
 from surgisim.physics.catalogue import Numbers, Term, choose, columns, defaults
 from surgisim.physics.place import Place, rows
@@ -79,12 +80,20 @@ class Prepared:
         spacing = self.simulator.grid.spacing
         laws = choose(self.terms)
         base = {n: t.row(values[n]) for n, t in laws.items() if t.energy is not None}
-        rate = wave_speed({n: laws[n] for n in base}, base, self.density) / spacing
+        rate = shear_speed({n: laws[n] for n in base}, base, self.density) / spacing
         motion = replace(motion, radius=np.maximum(motion.radius, LEAST_GRIP * spacing))
         held = self.body.held if held is None else held
-        spring = ANCHOR * rate**2
+        spring = (SHARP_ANCHOR if self.simulator.kinks.count else ANCHOR) * rate**2
         path = drive(
-            motion, self.body.rest, held, fps=fps, per_frame=per_frame, frames=frames, stiffness=spring, grip=grip
+            motion,
+            self.body.rest,
+            self.body.volume,
+            held,
+            fps=fps,
+            per_frame=per_frame,
+            frames=frames,
+            stiffness=spring,
+            grip=grip,
         )
         for name, term in laws.items():
             if term.drive is not None:
@@ -105,17 +114,24 @@ def prepare(
     precision: str = "single",
     threads: int = 1,
     form: str = "total",
+    grips: Motion | None = None,
 ) -> Prepared:
     """Lay the grid around the body and every further rest point it has to carry [m], (Q, 3).
 
-    form: 'total', or 'updated' for the paper's (single precision, one thread, no adjoint, no cut).
+    form: 'total', or 'updated' for the paper's (single precision, one thread, no adjoint, no cut). grips: a motion that
+    will be replayed, so that the tissue may bend sharply at the skin of what it grips.
     """
     given = {
         "rest": body.rest, "volume": body.volume, "density": density,
         "grid": Grid.around(body.rest, body.spacing, carried),
         "terms": terms, "gravity": gravity, "cut": cut, "device": device,
     }  # fmt: skip
-    simulator = Updated(**given) if form == "updated" else Simulator(**given, precision=precision, threads=threads)
+    if form == "updated":
+        return Prepared(Updated(**given), tuple(terms), density, body, places or {})
+    least = LEAST_GRIP * body.spacing
+    held = () if grips is None else zip(grips.center_rest, grips.radius, strict=True)
+    balls = tuple(Ball(np.asarray(c, float), max(float(r), least)) for c, r in held)
+    simulator = Simulator(**given, precision=precision, threads=threads, balls=balls)
     return Prepared(simulator, tuple(terms), density, body, places or {})
 
 

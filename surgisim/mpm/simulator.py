@@ -18,6 +18,7 @@ from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.kernels import node_kernels, particle_kernels, shapes, tick
+from surgisim.mpm.kink import Ball
 from surgisim.mpm.march import march
 from surgisim.mpm.nodes import Nodes
 from surgisim.physics.catalogue import choose, columns
@@ -84,18 +85,22 @@ class Simulator(Nodes):
         device: str = "cpu",
         precision: str = "single",
         threads: int = 1,
+        balls: tuple[Ball, ...] = (),
     ) -> None:
         """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,); precision is 'single' or 'double'.
 
-        threads: how many share a step on a CPU; results depend on their number by rounding only.
+        threads: how many share a step on a CPU; results depend on their number by rounding only. balls: gripped
+        tissue, at whose skin the displacement may bend.
         """
         self.rest, self.terms, self.device, self.density = np.asarray(rest, float), tuple(terms), device, float(density)
         self.count, self.volume_p, self.precision = len(rest), np.asarray(volume, float), precision
-        super().__init__(grid, self.rest, self.volume_p, cut)
+        super().__init__(grid, self.rest, self.volume_p, cut, balls)
         self.types = shapes(precision)
         self.real = np.float32 if precision == "single" else np.float64
         local, links = self.links(self.rest)
-        self._local, self._weight = local, links[..., 0]
+        # A kink's weights sum to nothing: its inertia is what keeps it as slow as a cell.
+        inertia = grid.spacing**2 * (links[..., 1:] ** 2).sum(-1)
+        self._local, self._weight = local, np.where(local < self.rule.shape[1], links[..., 0], inertia)
         order = np.argsort(local.ravel(), kind="stable").astype(np.int32)
         start = np.searchsorted(local.ravel()[order], np.arange(len(self.place) + 1)).astype(np.int32)
         s = self.types
@@ -263,7 +268,7 @@ class Simulator(Nodes):
         inputs = [[*shared, part, begin, u, v, q] for part, (begin, _) in enumerate(self.parts)]
         launch = {"device": self.device, "record_cmd": True}
         outs = [self.stress, self.push, self.force, self.trouble]
-        nodes = [self.clock, self.mass, self.gravity, s.real(drive.step), slots, self.force, u, v]
+        nodes = [self.clock, self.mass, self.gravity, self.rule.shape[1], s.real(drive.step), slots, self.force, u, v]
         forward = [
             self._particles(self.kernels.step, inputs, outs),
             [wp.launch(self.nodes.step, len(self.place), nodes, **launch)],
@@ -291,7 +296,8 @@ class Simulator(Nodes):
         hold = self._zeros((parts, *(drive.hold.shape if springs else (0, 0))), s.real)
         stiffness = self._zeros((parts, len(drive.path) if springs else 0), s.Mat)
         launch = {"device": self.device, "record_cmd": True}
-        before = [self.clock, self.mass, self.gravity, s.real(drive.step), task.slots, task.v, u, v, f, m]
+        gravity = [self.gravity, self.rule.shape[1]]
+        before = [self.clock, self.mass, *gravity, s.real(drive.step), task.slots, task.v, u, v, f, m]
         outs = [f, F, G, x, y, u, v, q, theta, rho, path, hold, stiffness]
         commands = [
             [wp.launch(tick, 1, [self.clock, -1], **launch)],
@@ -313,7 +319,7 @@ class Simulator(Nodes):
     def _anchors(self, drive: Drive):
         s = self.types
         anchors = s.Anchors()
-        anchors.member = self._put(drive.member, int)
+        anchors.member, anchors.share = self._put(drive.member, int), self._put(drive.share, s.real)
         anchors.path, anchors.hold = self._put(drive.path, s.Vec), self._put(drive.hold, s.real)
         anchors.turning = int(drive.turn is not None)
         turn = np.zeros((1, 1, 3, 3)) if drive.turn is None else drive.turn

@@ -3,6 +3,9 @@
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
+from surgisim.mpm.grip import SHARP_ANCHOR
 from surgisim.physics.catalogue import Numbers, Term
 from surgisim.problem import Problem
 
@@ -17,17 +20,38 @@ def wave_speed(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density: 
     return math.sqrt(factor * modulus / density)
 
 
-def largest_step(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density: float, spacing: float) -> float:
-    """Largest stable step [s]: 1 / (2 c / dx + 2 eta / (rho dx^2) + sqrt(k / rho) / 2 + c_d / 2).
+def shear_speed(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density: float) -> float:
+    """Speed of the shear wave at rest [m/s]: sqrt(mu / rho), summed over the laws that store energy.
 
-    The wave speed alone is not enough once viscosity grows: the second part is the explicit limit of
-    diffusion over one cell, halved as the first is. Springs k [N/m^4] and dampers c_d [1/s] of body forces add theirs.
+    mu is the mean slope of the laws' own stress in a small simple shear along x, y and z.
+    """
+    modulus, small, still = 0.0, 1e-4, np.zeros((3, 3))
+    for name, term in terms.items():
+        if term.energy is not None and term.stress is not None:
+            memory = np.zeros(max(1, term.memory))
+            for a in range(3):
+                shear = small * np.outer(np.eye(3)[a], np.eye(3)[a - 1])
+                up, down = (term.cauchy(np.eye(3) + s * shear, still, memory, 0.0, rows[name]) for s in (1, -1))
+                modulus += float((up - down)[a, a - 1]) / (2 * small) / 3
+    factor = math.prod(max(1.0, t.stiffens(**rows[n])) for n, t in terms.items() if t.stiffens)
+    return math.sqrt(factor * modulus / density)
+
+
+def largest_step(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density: float, spacing: float) -> float:
+    """Largest stable step [s]: 1 / (w + 2 eta / (rho dx^2) + sqrt(k / rho) / 2 + c_d / 2).
+
+    w = max(2 c, sqrt(5 c^2 + a s^2) / 2) / dx, c and s the speeds of pressure and shear waves, a the anchors' stiffness
+    (grip.py): the springs that hold tissue that can be squeezed (nu < .4) ring faster than it does. The wave speed
+    alone is not enough once viscosity grows: the second part is the explicit limit of diffusion over one cell, halved as the
+    first is. Springs k [N/m^4] and dampers c_d [1/s] of body forces add theirs.
     """
     viscosity, spring, damper = (
         sum(slot(**rows[n]) for n, t in terms.items() if (slot := getattr(t, kind)))
         for kind in ("viscosity", "spring", "damper")
     )
-    rate = 2 * wave_speed(terms, rows, density) / spacing + 2 * viscosity / (density * spacing**2)
+    c, shear = wave_speed(terms, rows, density), shear_speed(terms, rows, density)
+    rate = max(2 * c, 0.5 * math.sqrt(5 * c**2 + SHARP_ANCHOR * shear**2)) / spacing
+    rate += 2 * viscosity / (density * spacing**2)
     rate += 0.5 * math.sqrt(spring / density) + 0.5 * damper
     return 1 / rate
 

@@ -117,7 +117,8 @@ class Updated(Nodes):
         node = wp.zeros(world.count, dtype=s.Link, device=self.device)
         clock, trouble = wp.zeros(2, dtype=int, device=self.device), put([NEVER, 0], int)
         anchors = s.Anchors()
-        anchors.member, anchors.path = put(drive.member, int), put(drive.path, s.Vec)
+        anchors.member, anchors.share = put(drive.member, int), put(drive.share, s.real)
+        anchors.path = put(drive.path, s.Vec)
         anchors.hold, anchors.turning = put(drive.hold, s.real), int(drive.turn is not None)
         anchors.turn = put(np.zeros((1, 1, 3, 3)) if drive.turn is None else drive.turn, s.Mat)
         anchors.center = put(drive.center, s.Vec)
@@ -214,7 +215,7 @@ def kernels(names: tuple[str, ...]) -> SimpleNamespace:
                     if anchors.turning == 1:
                         arm = rest[p] - anchors.center[a]
                         to += anchors.turn[a, n] * arm - arm
-                    pull += anchors.hold[a, n] * (anchors.stiffness[a] * (to - (x[p] - rest[p])))
+                    pull += (anchors.share[p] * anchors.hold[a, n]) * (anchors.stiffness[a] * (to - (x[p] - rest[p])))
         mass = rho * volume[p]
         affine = mass * C[p] - (dt * 4.0 * volume[p] / (spacing * spacing)) * P * wp.transpose(F[p])
         momentum = mass * v[p] + dt * volume[p] * pull

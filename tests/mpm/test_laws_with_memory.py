@@ -121,7 +121,7 @@ def pull(made, drive, out, frame):
     mine = (drive.member >> 1) & 1 == 1
     x = simulator.grid.interpolate(simulator.displaced(out.u[frame]), simulator.rest[mine])
     away = drive.path[1, step] - x
-    volume = simulator.volume_p[mine][:, None]
+    volume = (drive.share * simulator.volume_p)[mine][:, None]
     return np.linalg.norm((DENSITY * volume * away).sum(0) @ drive.stiffness[1])
 
 
