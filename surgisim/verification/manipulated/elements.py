@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import Delaunay
 
-from surgisim.phantom.elements import elements
+from surgisim.phantom.elements import Elements, elements
 from surgisim.phantom.march import SAFETY, advance, least_swelling, stable_step
 from surgisim.problem import Problem
 from surgisim.verification.manipulated.mesh import Mesh, mesh
@@ -19,14 +19,16 @@ def follow(
     probes: np.ndarray,
     progress: Callable[[float, float, str], None] = lambda done, total, text: None,
     frames: int | None = None,
+    parts: Callable[[Mesh], Elements] | None = None,
 ) -> np.ndarray:
     """Displacement [m] of surface points `probes` (u, v) [m], (K, 2), at `scene.clock()`, (T, K, 3).
 
-    spacing: edge of the elements [m]; frames: stop after so many. Raises Problem when an element turns inside out.
+    spacing: edge of the elements [m]; frames: stop after so many; parts: the elements of a mesh, of the scene's law where
+    not given. Raises Problem when an element turns inside out.
     """
     first, second = scene.holds
     block = mesh(scene.shape, (first.grip, second.grip), spacing)
-    parts = elements(block.points, block.cells, scene.law)
+    parts = elements(block.points, block.cells, scene.law) if parts is None else parts(block)
     clock = scene.clock() if frames is None else np.arange((frames - 1) * FINE + 1) / FINE
     substeps = math.ceil(1 / FPS / FINE / (SAFETY * stable_step(block.points, parts, block.fixed)))
     dt = 1 / FPS / FINE / substeps

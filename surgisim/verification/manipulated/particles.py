@@ -66,9 +66,10 @@ def body(scene: Scene, spacing: float) -> Body:
     )
 
 
-def motion(scene: Scene, frames: int | None = None) -> Motion:
-    """Both grips, at the fine clock."""
-    clock = scene.clock() if frames is None else np.arange((frames - 1) * FINE + 1) / FINE
+def motion(scene: Scene, frames: int | None = None, fine: int = FINE) -> Motion:
+    """Both grips at `fine` instants a frame, for `frames` frames or the whole scene."""
+    frames = scene.frames if frames is None else frames
+    clock = np.arange((frames - 1) * fine + 1) / fine
     center = np.stack([scene.shape.upper(h.grip.uv) for h in scene.holds])
     position = np.stack([c + h.path(clock) for c, h in zip(center, scene.holds, strict=True)])
     active = np.stack([(clock > h.begin - 1e-9) & (clock < h.release + 1e-9) for h in scene.holds])
