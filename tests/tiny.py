@@ -32,6 +32,13 @@ def under(name: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*BASE, name)))
 
 
+def beside(name: str) -> tuple[str, ...]:
+    """The base laws, this one and a few others: laws in packs of five."""
+    more = [n for n in TERMS if n not in BASE]
+    first = more.index(name) // 5 * 5 if name in more else 0
+    return (*BASE, *more[first : first + 5])
+
+
 def on(names) -> Values:
     return {n: {**defaults(TERMS[n]), **TERMS[n].example, **BASE.get(n, {})} for n in names}
 
