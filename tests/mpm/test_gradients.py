@@ -55,13 +55,13 @@ def moved(theta, drive, begin, way, h):
 
 
 @cache
-def case(name, state, steps, precision="double", memory_mb=512.0):
+def case(name, state, steps, precision="double", memory_mb=512.0, sharp=False):
     """A run, a loss that weighs all it leaves at random, and its gradient: run, theta, start, first run, weights.
 
     In single precision other laws are there too, switched off: their kernel serves several.
     """
     others = under(name) if precision == "double" else beside(name)
-    made, values = body(others, precision), {n: off(n) for n in others} | on(under(name))
+    made, values = body(others, precision, sharp), {n: off(n) for n in others} | on(under(name))
     theta, at = made.theta(values), start(made, values, state, steps)
 
     def run(theta, drive, begin):
@@ -77,7 +77,14 @@ def case(name, state, steps, precision="double", memory_mb=512.0):
 @every_state
 @pytest.mark.parametrize("steps", [1, 1000])
 def test_the_adjoint_of_a_run_is_the_slope_of_its_loss(name, state, steps):
-    run, theta, at, out, c, gradient = case(name, state, steps)
+    assert_slope(name, steps, *case(name, state, steps))
+
+
+def test_the_adjoint_holds_where_tissue_may_bend_at_the_grip():
+    assert_slope("added_mass", 1000, *case("added_mass", "equal stretch", 1000, sharp=True))
+
+
+def assert_slope(name, steps, run, theta, at, out, c, gradient):
     rounding = 2e-12 * np.linalg.norm(c * out.u)
     for label, (slope, way) in directions(name, theta, at.begin, at.drive, gradient).items():
         # Large steps bend, small ones drown in rounding, and a kink (slip, yield, a maximum) may lie within one.
