@@ -21,15 +21,22 @@ BODY = slab(size=(0.018, 0.018, 0.018), spacing=0.006, per_axis=2)
 
 
 @cache
-def body(names: tuple[str, ...], precision: str = "double") -> Prepared:
-    """The block under these laws; kernels are compiled once for all tests."""
+def body(names: tuple[str, ...], precision: str = "double", sharp: bool = False) -> Prepared:
+    """The block under these laws, `sharp` if it may bend at the grip's skin; kernels are compiled only once."""
     places = {n: MIDDLE for n in names if TERMS[n].place == "somewhere"}
-    return prepare(BODY, names, density=DENSITY, places=places, precision=precision)
+    return prepare(BODY, names, density=DENSITY, places=places, precision=precision, grips=PULL if sharp else None)
 
 
 def under(name: str) -> tuple[str, ...]:
     """The base laws and one more."""
     return tuple(dict.fromkeys((*BASE, name)))
+
+
+def beside(name: str) -> tuple[str, ...]:
+    """The base laws, this one and a few others: laws in packs of five."""
+    more = [n for n in TERMS if n not in BASE]
+    first = more.index(name) // 5 * 5 if name in more else 0
+    return (*BASE, *more[first : first + 5])
 
 
 def on(names) -> Values:
@@ -60,7 +67,7 @@ def start(made: Prepared, values: Values, state: str, steps: int) -> Start:
     F = {"rest": np.eye(3), "equal stretch": 1.1 * np.eye(3), "turned": TURN}[state]
     nodes = made.simulator.grid.positions()[made.simulator.place]
     middle = BODY.rest.mean(0)
-    u = (nodes - middle) @ (F - np.eye(3)).T
+    u = np.where((made.simulator.place < 0)[:, None], 0, (nodes - middle) @ (F - np.eye(3)).T)
     path = drive.path + ((drive.center - middle) @ (F - np.eye(3)).T)[:, None]
     turn = np.broadcast_to(F if state == "turned" else np.eye(3), (*path.shape[:2], 3, 3))
     drive = replace(drive, path=path, turn=np.array(turn))
