@@ -213,8 +213,9 @@ therefore held against the bricks, and its difference from the published numbers
             f"{told}.\n"
         )
     said.append(
-        f"Runs end when no node is further than {100 * LEFT:.2f} % from rest, by its speed. The load is there from the beginning: "
-        "equilibrium does not depend on the way to it. Every grid after the first begins from the last one's answer.\n"
+        f"Runs end when no node is further than {100 * LEFT:.2f} % from rest, judged by its speed. The load is there "
+        "from the beginning: equilibrium does not depend on the way to it. Every grid after the first begins from the "
+        "last one's answer.\n"
     )
     return "\n".join(said)
 
