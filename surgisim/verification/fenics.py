@@ -186,13 +186,14 @@ therefore held against the bricks, and its difference from the published numbers
             )  # fmt: skip
         said.append(f"**The {name}**\n\n{table(head, rows)}")
         worst = {c: max(row["runs"][k]["max"] for row in part["rows"]) for k, c in enumerate(part["cells"])}
-        first = [
-            f"{_share(r)} % with {r['cells']} cells ({r['particles']} particles, {r['steps']} steps, {r['seconds']:.0f} s)"
+        most = ", ".join(f"{100 * w:.1f} % with {c} cells" for c, w in worst.items())
+        first = "; ".join(
+            f"{r['cells']} cells {_share(r)} % ({r['particles']} particles, {r['steps']} steps, {r['seconds']:.0f} s)"
             for r in part["rows"][0]["runs"]
-        ]
+        )
         said.append(
-            f"Worst of all sets: {', '.join(f'{100 * w:.1f} % with {c} cells' for c, w in worst.items())}. Set "
-            f"{part['rows'][0]['set']} on all its grids, and what they cost on one busy processor: {'; '.join(first)}.\n"
+            f"Worst of all sets: {most}. Set {part['rows'][0]['set']} on all its grids, and what they cost on one busy "
+            f"processor: {first}.\n"
         )
         if "elements" in part:
             e = part["elements"]
@@ -212,8 +213,9 @@ therefore held against the bricks, and its difference from the published numbers
             f"{told}.\n"
         )
     said.append(
-        f"Runs end when no node is further than {100 * LEFT:.2f} % from rest. The load is there from the beginning: "
-        "equilibrium does not depend on the way to it. Every grid after the first begins from the last one's answer.\n"
+        f"Runs end when no node is further than {100 * LEFT:.2f} % from rest, judged by its speed. The load is there "
+        "from the beginning: equilibrium does not depend on the way to it. Every grid after the first begins from the "
+        "last one's answer.\n"
     )
     return "\n".join(said)
 

@@ -102,7 +102,9 @@ def lay(
     step = SAFETY * min(edge, largest_step(choose(laws), made.stiffest(theta), density, spacing))
     nodes = made.simulator.grid.positions()[made.simulator.place]
     # Per area held (lambda + 2 mu) / dx; a sheet weighs density SHEET part[0] per area.
-    spring = ANCHOR * (speed / spacing) ** 2 if layer else held * speed**2 / spacing / (SHEET * part[0])
+    spring = held * speed**2 / spacing / (SHEET * part[0])
+    if layer:
+        spring = ANCHOR * E / (2 * (1 + nu) * density) / spacing**2
     return Laid(made, theta, nodes, member.astype(np.int32), spring, step)
 
 
@@ -119,9 +121,16 @@ def settle(
     ends = 1 if far is None else 2
     turn = None if far is None else np.broadcast_to(np.stack([np.eye(3), far])[:, None], (2, every + 1, 3, 3))
     drive = Drive(
-        laid.member, np.zeros((ends, every + 1, 3)), np.ones((ends, every)), laid.step, every,
-        np.tile(laid.spring * np.eye(3), (ends, 1, 1)), np.tile(center, (ends, 1)), turn,
-    )  # fmt: skip
+        member=laid.member,
+        share=np.ones(len(laid.member)),
+        path=np.zeros((ends, every + 1, 3)),
+        hold=np.ones((ends, every)),
+        step=laid.step,
+        per_frame=every,
+        stiffness=np.tile(laid.spring * np.eye(3), (ends, 1, 1)),
+        center=np.tile(center, (ends, 1)),
+        turn=turn,
+    )
     u, v = begin, np.zeros_like(begin)
     slowing = np.exp(-2 * slowest * every * laid.step)
     for done in range(1, 1 + round(PERIODS * period / (every * laid.step))):
