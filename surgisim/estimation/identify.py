@@ -7,8 +7,8 @@ from surgisim.estimation.search import Search
 from surgisim.estimation.support import Support
 
 TOLD = 0.1
-"""A number counts as told by the clip when its posterior spread is at most this share of the prior's: a modulus to about
-25 % either way (90 %), Poisson's ratio to about .02."""
+"""A number counts as told by the clip when its posterior spread is at most this share of the prior's: a modulus to
+about 25 % either way (90 %), Poisson's ratio to about .02."""
 
 
 def identifiability(

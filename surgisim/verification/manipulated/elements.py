@@ -23,8 +23,8 @@ def follow(
 ) -> np.ndarray:
     """Displacement [m] of surface points `probes` (u, v) [m], (K, 2), at `scene.clock()`, (T, K, 3).
 
-    spacing: edge of the elements [m]; frames: stop after so many; parts: the elements of a mesh, of the scene's law where
-    not given. Raises Problem when an element turns inside out.
+    spacing: edge of the elements [m]; frames: stop after so many; parts: the elements of a mesh, of the scene's law
+    where not given. Raises Problem when an element turns inside out.
     """
     first, second = scene.holds
     block = mesh(scene.shape, (first.grip, second.grip), spacing)
