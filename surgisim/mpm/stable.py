@@ -38,12 +38,12 @@ def shear_speed(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density:
 
 
 def largest_step(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density: float, spacing: float) -> float:
-    """Largest stable step [s]: 1 / (w + 3 eta / (rho dx^2) + sqrt(k / rho) / 2 + c_d / 2).
+    """Largest stable step [s]: 1 / (w + 2 eta / (rho dx^2) + sqrt(k / rho) / 2 + c_d / 2).
 
     w = max(2 c, sqrt(5 c^2 + a s^2) / 2) / dx, c and s the speeds of pressure and shear waves, a the anchors' stiffness
     (grip.py): the springs that hold tissue that can be squeezed (nu < .4) ring faster than it does. The wave speed
-    alone is not enough once viscosity grows: the second part is the explicit limit of diffusion over one cell, and
-    more at a free rim, whose nodes carry little mass. Springs k [N/m^4] and dampers c_d [1/s] of body forces add theirs.
+    alone is not enough once viscosity grows: the second part is the explicit limit of diffusion over one cell, halved as the
+    first is. Springs k [N/m^4] and dampers c_d [1/s] of body forces add theirs.
     """
     viscosity, spring, damper = (
         sum(slot(**rows[n]) for n, t in terms.items() if (slot := getattr(t, kind)))
@@ -51,7 +51,7 @@ def largest_step(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density
     )
     c, shear = wave_speed(terms, rows, density), shear_speed(terms, rows, density)
     rate = max(2 * c, 0.5 * math.sqrt(5 * c**2 + SHARP_ANCHOR * shear**2)) / spacing
-    rate += 3 * viscosity / (density * spacing**2)
+    rate += 2 * viscosity / (density * spacing**2)
     rate += 0.5 * math.sqrt(spring / density) + 0.5 * damper
     return 1 / rate
 
