@@ -5,8 +5,8 @@ viscosity. Axial: Love's rod, sqrt(E / rho) / (2 L) free and / (4 L) clamped at 
 lateral inertia. Bending: Timoshenko's beam. See beam_theory.py.
 
 Error model: free ends fall with the square of the spacing (nodal masses are lumped). At a clamp the anchors are
-springs of rate k = a mu / (rho dx^2) per unit of mass, which give way over a depth sqrt(E / (rho k)): the bar acts as if
-it were longer by dx sqrt(E / (a mu)), so the error there falls with the first power.
+springs of rate k = a mu / (rho dx^2) per unit of mass, which give way over a depth sqrt(E / (rho k)): the bar acts as
+if it were longer by dx sqrt(E / (a mu)), so the error there falls with the first power.
 """
 
 import numpy as np

@@ -52,7 +52,7 @@ def rebound(scene: Scene, hold: Hold, run: np.ndarray) -> tuple[float, float]:
     k = turns[0]
     bend = along[k - 1] - 2 * along[k] + along[k + 1]
     between = (along[k - 1] - along[k + 1]) / (2 * bend) if bend else 0.0
-    return float((k + between) / FINE / FPS), float(along[k])
+    return float((k + between) / FINE / FPS), float(along[k] - (along[k - 1] - along[k + 1]) * between / 4)
 
 
 def curve(scene: Scene, hold: Hold, run: np.ndarray, frames: int = 6) -> np.ndarray:

@@ -23,7 +23,7 @@ MODES = 3
 
 def model_error(scenes: list[Scene], differences: list[np.ndarray]) -> dict:
     """The numbers of the covariance, from differences [m], (T, K, 3) at each scene's clock; JSON-able."""
-    scaled = [_scaled(scene, e) for scene, e in zip(scenes, differences, strict=True)]
+    scaled = [_Scaled(scene, e) for scene, e in zip(scenes, differences, strict=True)]
     deviation = np.zeros((len(PHASES), len(EDGES) - 1))
     for k in range(len(PHASES)):
         ring = np.concatenate([s.ring[s.phase == k].ravel() for s in scaled])
@@ -32,7 +32,7 @@ def model_error(scenes: list[Scene], differences: list[np.ndarray]) -> dict:
         total = np.bincount(ring, square, len(EDGES) - 1)[: len(EDGES) - 1]
         deviation[k] = np.sqrt(total / np.maximum(count, 1))
     patterns = np.stack([p for scene, s in zip(scenes, scaled, strict=True) for p in s.patterns])
-    mean = np.nanmean(patterns, 0)
+    mean = np.nansum(patterns, 0) / np.maximum(np.isfinite(patterns).sum(0), 1)
     rest = np.nan_to_num(patterns - mean).reshape(len(patterns), -1)
     _, sizes, modes = np.linalg.svd(rest, full_matrices=False)
     return {
@@ -44,7 +44,7 @@ def model_error(scenes: list[Scene], differences: list[np.ndarray]) -> dict:
         "mean": mean,
         "modes": modes[:MODES].reshape(-1, *mean.shape),
         "sizes": sizes[:MODES] / np.sqrt(len(patterns)),
-        "explained": (sizes[:MODES] ** 2).sum() / (sizes**2).sum(),
+        "explained": (sizes[:MODES] ** 2).sum() / max((sizes**2).sum(), 1e-30),
         "pulls": len(patterns),
     }
 
@@ -64,7 +64,7 @@ def covariance(
     return s[:, None] * s[None] * np.exp(-apart / error["length"])
 
 
-class _scaled:
+class _Scaled:
     """One scene's difference per unit of motion, at frames."""
 
     def __init__(self, scene: Scene, difference: np.ndarray) -> None:
@@ -75,7 +75,8 @@ class _scaled:
         self.error = difference[::FINE].copy()
         self.patterns, self.held = [], []
         for hold in scene.holds:
-            mine = (frames >= hold.begin) & (frames < (scene.holds[1].begin if hold is scene.holds[0] else 10**9))
+            until = scene.holds[1].begin if hold is scene.holds[0] else scene.frames
+            mine = (frames >= hold.begin) & (frames < until)
             reach = np.linalg.norm(hold.path(np.minimum(frames, hold.release).astype(float)), axis=1)
             # Just after the grasp the motion is too small to divide by.
             reach = np.maximum(reach, 0.05 * np.linalg.norm(hold.pull))
@@ -89,7 +90,7 @@ class _scaled:
 
 
 def _pattern(scene, hold, radii, away, error) -> np.ndarray:
-    """Mean of the difference in every ring and direction, in the pull's axes, (rings, DIRECTIONS, 3); NaN where none."""
+    """Mean difference in every ring and direction, in the pull's axes, (rings, DIRECTIONS, 3); NaN where none is."""
     u, v, depth = scene.shape.axes
     shadow = np.array([hold.pull @ u, hold.pull @ v])
     shadow = shadow / np.linalg.norm(shadow)
@@ -127,11 +128,14 @@ def _time(scaled, phase: int) -> float:
     for s in scaled:
         frames = np.flatnonzero(s.phase == phase)
         for part in np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1):
-            e = s.error[part].reshape(len(part), -1)
-            size = np.sqrt((e**2).mean(1))
-            if len(part) > 1 and size.all():
+            part = part[s.error[part].any((1, 2))]
+            if len(part) > 1:
+                e = s.error[part].reshape(len(part), -1)
+                size = np.sqrt((e**2).mean(1))
                 apart.append((np.abs(part[:, None] - part[None]) / FPS).ravel())
                 product.append((e @ e.T / e.shape[1] / size[:, None] / size[None]).ravel())
+    if not apart:
+        return 0.0
     return _fall(np.concatenate(apart), np.concatenate(product), (np.arange(13) - 0.5) / FPS)
 
 
