@@ -17,7 +17,10 @@ CHEAP = '''"""Write one line to every output."""
 import sys
 from pathlib import Path
 
-FIT = '{"header": {"kind": "Fit"}, "history": [], "identifiability": {}, "held_out": {}, "words": "Not fitted."}'
+FIT = (
+    '{"header": {"kind": "Fit"}, "history": [], "identifiability": {}, "held_out": {}, "words": "Not fitted.", '
+    '"numerical_damping": null}'
+)
 stage = Path(__file__).stem
 if (Path(__file__).parents[1] / "broken").exists() and stage in (Path(__file__).parents[1] / "broken").read_text():
     sys.exit("error: " + stage + " is broken on purpose.")

@@ -9,6 +9,8 @@ from surgisim.phantom.block import Grip, Shape
 from surgisim.phantom.law import Law
 from surgisim.phantom.timeline import ease
 
+PHASES = ("load", "hold", "release", "rest")
+"""What `Scene.phase` counts."""
 FPS = 25.0
 """Frames a second, as a clip has."""
 FINE = 10
