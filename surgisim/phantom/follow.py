@@ -26,8 +26,12 @@ def follow(model: Model, progress: Progress | None = None, text: str = "moving t
     tracks = np.empty((scene.frames, len(scene.probes), 3))
     tracks[0] = read(x)
     steps = substeps(model)
+    taken: dict[int, np.ndarray] = {}
     for frame in range(1, scene.frames):
-        advance(model, x, v, frame, steps)
+        for j, hold in enumerate(scene.holds):
+            if frame == hold.begin + 1:
+                taken[j] = x - model.mesh.points
+        advance(model, x, v, frame, steps, taken)
         if not np.isfinite(x).all() or least_swelling(x, model.mesh.cells) <= 0:
             raise Problem(
                 f"phantom: the elements turned inside out at frame {frame}, with {steps} steps a frame. Pull less "
@@ -46,14 +50,18 @@ def substeps(model: Model) -> int:
     return math.ceil(1 / model.scene.fps / stable)
 
 
-def advance(model: Model, x: np.ndarray, v: np.ndarray, frame: int, steps: int) -> None:
-    """Move x and v from the frame before to `frame`."""
+def advance(model: Model, x: np.ndarray, v: np.ndarray, frame: int, steps: int, taken: dict[int, np.ndarray]) -> None:
+    """Move x and v from the frame before to `frame`.
+
+    `taken` holds, for each grip that has closed, the displacement [m], (N, 3), in which it found the tissue.
+    """
     scene, parts, rest = model.scene, model.parts, model.mesh.points
     dt = 1 / scene.fps / steps
     force, pull = np.empty_like(x), dt / parts.mass
     law = parts.cells, parts.inverse, parts.weight, parts.mu, parts.lam, parts.eta
     held = [j for j, h in enumerate(scene.holds) if h.begin < frame <= h.release]
     nodes = [np.flatnonzero(model.mesh.gripped[j] & ~model.mesh.fixed) for j in held]
+    found = [taken[j][mine] + rest[mine] for j, mine in zip(held, nodes, strict=True)]
     for s in range(steps):
         t = (frame - 1) / scene.fps + s * dt
         force[:] = 0.0
@@ -64,8 +72,8 @@ def advance(model: Model, x: np.ndarray, v: np.ndarray, frame: int, steps: int) 
             pull = dt / (parts.mass + model.burden[1](t) * model.burden[0])
         _kick(v, force, pull)
         model.support.hold(x, v, t + dt, dt)
-        for j, mine in zip(held, nodes, strict=True):
-            v[mine] = (rest[mine] + model.grasp[j](t + dt) - x[mine]) / dt
+        for j, mine, there in zip(held, nodes, found, strict=True):
+            v[mine] = (there + model.grasp[j](t + dt, rest[mine]) - x[mine]) / dt
         _drift(x, v, dt)
 
 

@@ -42,8 +42,8 @@ class Model:
     mesh: Mesh
     parts: Elements
     support: Support
-    grasp: tuple[Callable[[float], np.ndarray], ...]
-    """Displacement of the nodes of each grip [m], (3,), at a time [s]."""
+    grasp: tuple[Callable[[float, np.ndarray], np.ndarray], ...]
+    """Displacement that each grip gives to its nodes [m], (Q, 3), at a time [s]; Q places at rest [m], (Q, 3)."""
     forces: tuple[Force, ...] = ()
     burden: tuple[np.ndarray, Callable[[float], float]] | None = None
     """Mass added at the nodes [kg], (N,), and the share of it that is there at a time [s]."""
@@ -76,7 +76,7 @@ class Model:
 def model(scene: Scene, spacing: float) -> Model:
     """The scene with nothing concealed, in elements of about `spacing` [m]."""
     block = mesh(scene.shape, tuple(h.grip for h in scene.holds), spacing)
-    grasp = tuple(lambda t, h=h: h.path(t * scene.fps) for h in scene.holds)
+    grasp = tuple(lambda t, rest, h=h: np.tile(h.path(t * scene.fps), (len(rest), 1)) for h in scene.holds)
     parts = elements(block.points, block.cells, scene.law)
     return Model(scene, block, parts, Still(np.flatnonzero(block.fixed)), grasp)
 

@@ -27,17 +27,20 @@ class Found:
 def scaled(measure: Callable[[float], float], wanted: float, *, start: float, most: float) -> Found:
     """The magnitude in (0, most] at which `measure` is `wanted`, or the one nearest to it, by secants of logarithms.
 
-    `measure` grows with the magnitude, from 0 at 0; it may be 0 below a threshold.
+    `measure` grows with the magnitude, from 0 at 0; it may be 0 below a threshold, and
+    infinite where the tissue does not bear the effect.
     """
     low, high = None, None
     magnitude, best = min(start, most), Found(0.0, 0.0)
     for _ in range(TRIES):
         ratio = measure(magnitude)
-        if abs(math.log(max(ratio, 1e-9) / wanted)) < abs(math.log(max(best.ratio, 1e-9) / wanted)):
+        if not math.isinf(ratio) and abs(math.log(max(ratio, 1e-9) / wanted)) < abs(math.log(max(best.ratio, 1e-9) / wanted)):
             best = Found(magnitude, ratio)
         if abs(math.log(max(best.ratio, 1e-9) / wanted)) < CLOSE or (magnitude == most and ratio < wanted):
             break
-        if ratio < wanted:
+        if math.isinf(ratio):
+            high = (math.log(magnitude), math.log(8 * wanted))
+        elif ratio < wanted:
             low = (math.log(magnitude), math.log(max(ratio, 1e-9)))
         else:
             high = (math.log(magnitude), math.log(ratio))

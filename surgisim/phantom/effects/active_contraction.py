@@ -74,6 +74,6 @@ EFFECT = Effect(
     parameter="tension",
     unit="Pa",
     start=0.2,
-    most=1.5,
+    most=0.8,
     value=lambda scene, hidden: hidden.magnitude * scene.law.E,
 )

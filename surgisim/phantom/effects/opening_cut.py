@@ -1,4 +1,4 @@
-"""A cut opens while the tissue is held: along a short plane it comes apart within a moment.
+"""A cut opens while the tissue is held: along a plane beside the grip it comes apart within a moment.
 
     mu, lambda -> (1 - s(t) w(X)) mu, lambda                          w: 1 in a thin slab from the upper side down
 
@@ -38,13 +38,13 @@ class Opening:
 
 def draw(scene, rng, name):
     hold = scene.holds[0]
-    at = near_grip(scene, rng, (hold.grip.radius + 0.003, hold.grip.radius + 0.007), (0.0, 0.01))
+    at = near_grip(scene, rng, (hold.grip.radius + 0.002, hold.grip.radius + 0.005), (0.0, 0.01))
     along = at - scene.shape.upper(hold.grip.uv)
     along[2] = 0.0
     # Across the line to the grip, so that the pull opens it.
     heading = math.atan2(along[1], along[0]) + np.pi / 2 + rng.uniform(-0.4, 0.4)
     begin = rng.uniform(hold.arrive + 2, (hold.arrive + hold.release) / 2) / scene.fps
-    numbers = {"along": ([math.cos(heading), math.sin(heading), 0.0], "1"), "depth": (rng.uniform(0.5, 0.8), "1")}
+    numbers = {"along": ([math.cos(heading), math.sin(heading), 0.0], "1"), "depth": (rng.uniform(0.7, 0.95), "1")}
     return Hidden(name, center=at, extent=None, onset=begin, numbers=numbers)
 
 

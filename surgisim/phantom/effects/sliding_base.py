@@ -47,5 +47,5 @@ def apply(model, hidden):
 
 
 EFFECT = Effect(
-    draw=draw, apply=apply, parameter="traction", unit="Pa", start=15.0, most=1000.0, value=traction
+    draw=draw, apply=apply, parameter="traction", unit="Pa", start=15.0, most=200.0, value=traction
 )

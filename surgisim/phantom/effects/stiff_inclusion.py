@@ -7,8 +7,8 @@ from surgisim.phantom.effect import Effect, Hidden, near_grip
 
 
 def draw(scene, rng, name):
-    radius = rng.uniform(0.005, 0.008)
-    at = near_grip(scene, rng, (0.5 * radius + scene.holds[0].grip.radius, radius + 0.011), (0.15, 0.6))
+    radius = rng.uniform(0.006, 0.010)
+    at = near_grip(scene, rng, (0.004, 0.012), (0.1, 0.5))
     return Hidden(name, center=at, extent=radius)
 
 
@@ -22,6 +22,6 @@ EFFECT = Effect(
     parameter="factor",
     unit="1",
     start=3.0,
-    most=15.0,
+    most=25.0,
     value=lambda scene, hidden: 1 + hidden.magnitude,
 )

@@ -24,10 +24,10 @@ def draw(scene, rng, name):
 def apply(model, hidden):
     tau, carried = hidden.number("tau"), model.grasp[0]
 
-    def slipping(t):
+    def slipping(t, rest):
         # Begins gently: the square keeps the speed of the nodes continuous.
         late = max(t - hidden.onset, 0.0) / tau
-        return (1 - hidden.magnitude * (1 - math.exp(-late)) ** 2) * carried(t)
+        return (1 - hidden.magnitude * (1 - math.exp(-late)) ** 2) * carried(t, rest)
 
     return replace(model, grasp=(slipping, *model.grasp[1:]))
 
