@@ -55,16 +55,18 @@ def name_of(seed: int, case: int) -> str:
     return "r-" + hashlib.sha256(f"{seed}/{case}".encode()).hexdigest()[:8]
 
 
-def invent(settings: Invent, progress: Progress | None = None) -> Invented:
+def invent(settings: Invent, progress: Progress | None = None, names: tuple[str, ...] | None = None) -> Invented:
     """The case `settings.case` of `settings.seed`: the same bytes every time on one machine.
 
+    `names` conceals these effects instead of what the mixture says, in the same scene with the same nuisances.
     Raises Problem when no place is found where the tissue bears the effect.
     """
     spacings = settings.spacing, settings.spacing_coarse
     scene = draw(generator(settings, "scene"), fps=settings.fps, points=settings.points, spacings=spacings)
     plain = follow(model(scene, settings.spacing), progress, "moving the tissue without the effect")
     free = nuisance.visible(scene, plain, generator(settings, "visible"))
-    names = concealed(settings.seed, settings.case, tuple(settings.only), settings.faint)
+    if names is None:
+        names = concealed(settings.seed, settings.case, tuple(settings.only), settings.faint)
     true, aims = _with_effects(settings, scene, names, plain, free, progress)
     seen = nuisance.seen(scene, true, settings.noise, generator(settings, "noise"))
     name = name_of(settings.seed, settings.case)
@@ -108,7 +110,9 @@ def _with_effects(settings, scene, names, plain, free, progress) -> tuple[np.nda
     for _ in range(1 + RERUNS):
         hidden = tuple(_times(a.hidden, factor) for a in aims)
         try:
-            true = follow(conceal(model(scene, settings.spacing), hidden), progress, "moving the tissue with the effect")
+            true = follow(
+                conceal(model(scene, settings.spacing), hidden), progress, "moving the tissue with the effect"
+            )
         except Problem:
             factor *= 0.8
             continue
@@ -164,15 +168,11 @@ def _truth(settings, scene, name, aims, plain, true, free, tracks) -> dict:
         "seed": settings.seed,
         "case": settings.case,
         "kind": kind,
-        "effects": [
-            described(scene, a.hidden) | {"snr_asked": a.asked, "snr_alone_coarse": a.alone} for a in aims
-        ],
+        "effects": [described(scene, a.hidden) | {"snr_asked": a.asked, "snr_alone_coarse": a.alone} for a in aims],
         "snr": ratio(settings, scene, difference, free),
         "snr_held_out": ratio(settings, scene, difference, free, held_out=True),
         "noise": settings.noise,
         "base": {"E": law.E, "nu": law.nu, "eta": law.eta, "density": law.density},
-        "phases": [
-            {"begin": h.begin, "arrive": h.arrive, "release": h.release} for h in scene.holds
-        ],
+        "phases": [{"begin": h.begin, "arrive": h.arrive, "release": h.release} for h in scene.holds],
         "tracks_sha256": hashlib.sha256(tracks).hexdigest(),
     }

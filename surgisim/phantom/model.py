@@ -51,9 +51,7 @@ class Model:
     """Shear modulus [Pa] and viscosity [Pa s] that `forces` may add, for the choice of steps."""
 
     def with_force(self, force: Force, *, mu: float = 0.0, eta: float = 0.0) -> "Model":
-        return replace(
-            self, forces=(*self.forces, force), reserve=(self.reserve[0] + mu, self.reserve[1] + eta)
-        )
+        return replace(self, forces=(*self.forces, force), reserve=(self.reserve[0] + mu, self.reserve[1] + eta))
 
     def with_moduli(self, factor: np.ndarray) -> "Model":
         """mu and lambda of every element times `factor`, (M,)."""

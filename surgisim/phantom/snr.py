@@ -34,7 +34,9 @@ def scaled(measure: Callable[[float], float], wanted: float, *, start: float, mo
     magnitude, best = min(start, most), Found(0.0, 0.0)
     for _ in range(TRIES):
         ratio = measure(magnitude)
-        if not math.isinf(ratio) and abs(math.log(max(ratio, 1e-9) / wanted)) < abs(math.log(max(best.ratio, 1e-9) / wanted)):
+        if not math.isinf(ratio) and abs(math.log(max(ratio, 1e-9) / wanted)) < abs(
+            math.log(max(best.ratio, 1e-9) / wanted)
+        ):
             best = Found(magnitude, ratio)
         if abs(math.log(max(best.ratio, 1e-9) / wanted)) < CLOSE or (magnitude == most and ratio < wanted):
             break

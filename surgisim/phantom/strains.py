@@ -42,9 +42,7 @@ def patch(points: np.ndarray, cells: np.ndarray, share: np.ndarray | None = None
     jacobian = np.einsum("mai,gak->mgik", points[cells], SLOPES)
     weight = np.linalg.det(jacobian)
     slope = np.einsum("gak,mgkj,mg->maj", SLOPES, np.linalg.inv(jacobian), weight) / weight.sum(1)[:, None, None]
-    return Patch(
-        np.ascontiguousarray(cells), np.ascontiguousarray(slope), weight.sum(1) * share[number], number
-    )
+    return Patch(np.ascontiguousarray(cells), np.ascontiguousarray(slope), weight.sum(1) * share[number], number)
 
 
 def blob(points: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:

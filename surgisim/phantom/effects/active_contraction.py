@@ -1,6 +1,6 @@
 """Muscle that contracts in waves, whether it is touched or not.
 
-    P = T(X, t) F a (x) a,  T = T0 max(0, sin(2 pi (t / period - X . n / length)))^2 after the onset      [Pa]
+P = T(X, t) F a (x) a,  T = T0 max(0, sin(2 pi (t / period - X . n / length)))^2 after the onset      [Pa]
 """
 
 import math

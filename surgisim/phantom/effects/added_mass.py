@@ -1,6 +1,6 @@
 """Something is laid on, or in, the tissue: it weighs and it is slow to move.
 
-    m added in a ball, with its weight, from an onset on                                           [kg]
+m added in a ball, with its weight, from an onset on                                           [kg]
 """
 
 from dataclasses import replace

@@ -1,6 +1,6 @@
 """The deepest part of the tissue is stiffer, or softer, than the rest.
 
-    mu, lambda -> m mu, lambda below a depth
+mu, lambda -> m mu, lambda below a depth
 """
 
 import numpy as np

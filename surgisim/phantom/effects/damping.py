@@ -1,6 +1,6 @@
 """A lump of tissue that is slower to deform than the rest.
 
-    sigma += 2 e w(X) D                                               [Pa]
+sigma += 2 e w(X) D                                               [Pa]
 """
 
 from surgisim.phantom.effect import Effect, Hidden, near_grip

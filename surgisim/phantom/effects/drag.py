@@ -1,6 +1,6 @@
 """The surface is slowed by what it moves through.
 
-    f = -c v on the upper side                                        [Pa s/m]
+f = -c v on the upper side                                        [Pa s/m]
 """
 
 from dataclasses import dataclass, replace

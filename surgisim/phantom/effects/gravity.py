@@ -1,6 +1,6 @@
 """The table is tilted: gravity turns or grows, and the tissue, in balance before, sags.
 
-    f = rho (g' - g)                                                  [N/m^3]
+f = rho (g' - g)                                                  [N/m^3]
 """
 
 import numpy as np

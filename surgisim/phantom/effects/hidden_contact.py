@@ -1,6 +1,6 @@
 """Something that nobody sees pushes for a while: a second instrument under the rim, or a neighbour organ.
 
-    f = A d w(X) / sum w, while it touches                            [N]
+f = A d w(X) / sum w, while it touches                            [N]
 """
 
 import math

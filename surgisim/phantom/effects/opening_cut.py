@@ -61,7 +61,7 @@ def apply(model, hidden):
     deep = hidden.number("depth") * shape.thickness
     slab = [
         (1.1 * edge - across) / edge,
-        (length(model.scene, hidden) / 2 - np.abs(off @ along)) / edge + 0.5,
+        (length(model.scene, hidden) / 2 - np.abs(off @ along)) / edge,
         (deep - np.abs(off[:, 2])) / edge + 0.5,
     ]
     share = in_lanes(np.prod([np.clip(s, 0, 1) for s in slab], axis=0))
@@ -71,6 +71,4 @@ def apply(model, hidden):
     return replace(model, parts=replace(parts, mu=now[0], lam=now[1])).with_force(law)
 
 
-EFFECT = Effect(
-    draw=draw, apply=apply, parameter="length", unit="m", start=0.8, most=2.0, value=length, outside=True
-)
+EFFECT = Effect(draw=draw, apply=apply, parameter="length", unit="m", start=0.8, most=2.0, value=length, outside=True)

@@ -1,6 +1,6 @@
 """The base breathes, from the first frame on.
 
-    u = A (s(t) - s(0)) d,  s = sin(2 pi f t + p) + h sin(4 pi f t + q)                            [m]
+u = A (s(t) - s(0)) d,  s = sin(2 pi f t + p) + h sin(4 pi f t + q)                            [m]
 """
 
 import math

@@ -17,7 +17,9 @@ RISE = 0.5
 GRASP = 0.1
 """How long it closes and opens [s]."""
 STIFF = 8.0
-"""Of the jaws, over E times the patch's radius."""
+"""Of the jaws, over E times the patch's radius, once they pull by FIRM."""
+FIRM = 2e-3
+"""[m]; a grip that hardly pulls hardly holds."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +58,10 @@ def apply(model, hidden):
     points = model.mesh.points
     share = hidden.share(points) * model.parts.mass * ~model.mesh.fixed * ~model.mesh.gripped.any(0)
     nodes = np.flatnonzero(share > 1e-3 * share.max())
-    stiffness = STIFF * model.scene.law.E * hidden.extent * share[nodes] / share.sum()
+    firm = min(hidden.magnitude / FIRM, 1.0)
+    stiffness = firm * STIFF * model.scene.law.E * hidden.extent * share[nodes] / share.sum()
     pull = hidden.magnitude * hidden.vector("direction")
     return model.with_force(Jaws(nodes, stiffness, points[nodes], pull, hidden))
 
 
-EFFECT = Effect(
-    draw=draw, apply=apply, parameter="displacement", unit="m", start=3e-3, most=9e-3, outside=True
-)
+EFFECT = Effect(draw=draw, apply=apply, parameter="displacement", unit="m", start=3e-3, most=9e-3, outside=True)

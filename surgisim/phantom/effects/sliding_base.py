@@ -1,6 +1,6 @@
 """The base holds by friction only and slides where it is pulled harder.
 
-    tangential traction <= c,  and equal to c against the motion where it slides                   [Pa]
+tangential traction <= c,  and equal to c against the motion where it slides                   [Pa]
 """
 
 from dataclasses import dataclass, replace
@@ -46,6 +46,4 @@ def apply(model, hidden):
     return replace(model, mesh=free, support=Sliding(nodes, most, model.scene.shape.axes[2]))
 
 
-EFFECT = Effect(
-    draw=draw, apply=apply, parameter="traction", unit="Pa", start=15.0, most=200.0, value=traction
-)
+EFFECT = Effect(draw=draw, apply=apply, parameter="traction", unit="Pa", start=15.0, most=200.0, value=traction)

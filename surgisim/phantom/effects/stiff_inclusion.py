@@ -1,6 +1,6 @@
 """A lump of stiffer tissue.
 
-    mu, lambda -> (1 + m w(X)) mu, lambda                             w: 1 inside, 0 outside
+mu, lambda -> (1 + m w(X)) mu, lambda                             w: 1 inside, 0 outside
 """
 
 from surgisim.phantom.effect import Effect, Hidden, near_grip

@@ -1,6 +1,6 @@
 """An adhesion: short strands from a patch of tissue to something below that does not move, slack at first.
 
-    f = k max(0, |x - b| - (L + slack)) toward b                      [N], pulling only, k shared among the strands
+f = k max(0, |x - b| - (L + slack)) toward b                      [N], pulling only, k shared among the strands
 """
 
 import numpy as np
@@ -26,9 +26,7 @@ def apply(model, hidden):
     share = (share * model.parts.mass)[nodes]
     stiffness = hidden.magnitude * scene.law.E * hidden.extent * share / share.sum()
     still = np.zeros(3)
-    return model.with_force(
-        Springs(nodes, stiffness, feet, length, hidden.number("slack"), lambda t: still, always)
-    )
+    return model.with_force(Springs(nodes, stiffness, feet, length, hidden.number("slack"), lambda t: still, always))
 
 
 EFFECT = Effect(

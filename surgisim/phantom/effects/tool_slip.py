@@ -1,6 +1,6 @@
 """The jaws slide off: from some moment on the tissue follows them less and less.
 
-    u = (1 - s (1 - exp(-(t - t0) / tau))^2) p(t)                     p the tool's path
+u = (1 - s (1 - exp(-(t - t0) / tau))^2) p(t)                     p the tool's path
 """
 
 import math
