@@ -119,7 +119,7 @@ def _with_effects(settings, scene, names, plain, free, progress) -> tuple[np.nda
         off = ratio(settings, scene, true - plain, free) / wanted
         if best is None or abs(math.log(off)) < abs(math.log(best[0])):
             best = off, true, hidden
-        if abs(math.log(off)) < NEAR or all(h.magnitude >= catalogue()[h.name].most for h in hidden) and off < 1:
+        if abs(math.log(off)) < NEAR or (all(h.magnitude >= catalogue()[h.name].most for h in hidden) and off < 1):
             break
         factor /= off
     if best is None:
