@@ -105,7 +105,7 @@ def _with_effects(settings, scene, names, plain, free, progress) -> tuple[np.nda
 
     aims = tuple(_aim(settings, scene, name, rng, measure) for name in names)
     # Fine elements answer a little differently from coarse ones; one factor for all effects mends that.
-    wanted = aims[0].alone if len(aims) == 1 else measure(*(a.hidden for a in aims))
+    wanted = _within_reach(aims[0]) if len(aims) == 1 else measure(*(a.hidden for a in aims))
     factor, best = 1.0, None
     for _ in range(1 + RERUNS):
         hidden = tuple(_times(a.hidden, factor) for a in aims)
@@ -151,6 +151,11 @@ def _aim(settings: Invent, scene: Scene, name: str, rng: np.random.Generator, me
         lambda magnitude: measure(hidden.scaled(magnitude)), asked, start=effect.start, most=effect.most
     )
     return Aim(hidden.scaled(found.magnitude), asked, found.ratio)
+
+
+def _within_reach(aim: Aim) -> float:
+    """What was asked for, or what quick runs gave where that cannot be had."""
+    return aim.asked if abs(math.log(aim.alone / aim.asked)) < NEAR else aim.alone
 
 
 def _times(hidden: Hidden, factor: float) -> Hidden:
