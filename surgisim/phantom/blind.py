@@ -26,8 +26,8 @@ PLACES = 3
 """Places that an effect may try before it is taken as strong as it gets."""
 NEAR = 0.10
 """How near the fine run's ratio must come to the wanted one; otherwise it is run again."""
-RERUNS = 2
-"""Fine runs again, at most."""
+FINE_RUNS = 4
+"""At most."""
 
 
 @dataclass(frozen=True)
@@ -106,28 +106,28 @@ def _with_effects(settings, scene, names, plain, free, progress) -> tuple[np.nda
     aims = tuple(_aim(settings, scene, name, rng, measure) for name in names)
     # Fine elements answer a little differently from coarse ones; one factor for all effects mends that.
     wanted = _within_reach(aims[0]) if len(aims) == 1 else measure(*(a.hidden for a in aims))
-    factor, best = 1.0, None
-    for _ in range(1 + RERUNS):
+    runs: dict[float, tuple[np.ndarray, tuple[Hidden, ...]]] = {}
+
+    def measure_fine(factor: float) -> float:
         hidden = tuple(_times(a.hidden, factor) for a in aims)
         try:
             true = follow(
                 conceal(model(scene, settings.spacing), hidden), progress, "moving the tissue with the effect"
             )
         except Problem:
-            factor *= 0.8
-            continue
-        off = ratio(settings, scene, true - plain, free) / wanted
-        if best is None or abs(math.log(off)) < abs(math.log(best[0])):
-            best = off, true, hidden
-        if abs(math.log(off)) < NEAR or (all(h.magnitude >= catalogue()[h.name].most for h in hidden) and off < 1):
-            break
-        factor /= off
-    if best is None:
+            return math.inf
+        runs[factor] = true, hidden
+        return ratio(settings, scene, true - plain, free)
+
+    most = max(catalogue()[a.hidden.name].most / a.hidden.magnitude for a in aims)
+    found = scaled(measure_fine, wanted, start=1.0, most=most, close=NEAR, tries=FINE_RUNS)
+    if not found.magnitude:
         raise Problem(
             f"phantom: case {settings.case} of seed {settings.seed}: the tissue does not bear {' and '.join(names)} in "
             "fine elements. Take another seed, or a lower snr_high."
         )
-    return best[1], tuple(Aim(h, a.asked, a.alone) for h, a in zip(best[2], aims, strict=True))
+    true, hidden = runs[found.magnitude]
+    return true, tuple(Aim(h, a.asked, a.alone) for h, a in zip(hidden, aims, strict=True))
 
 
 def _aim(settings: Invent, scene: Scene, name: str, rng: np.random.Generator, measure) -> Aim:

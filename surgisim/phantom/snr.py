@@ -24,7 +24,15 @@ class Found:
     """Signal-to-noise ratio at this magnitude."""
 
 
-def scaled(measure: Callable[[float], float], wanted: float, *, start: float, most: float) -> Found:
+def scaled(
+    measure: Callable[[float], float],
+    wanted: float,
+    *,
+    start: float,
+    most: float,
+    close: float = CLOSE,
+    tries: int = TRIES,
+) -> Found:
     """The magnitude in (0, most] at which `measure` is `wanted`, or the one nearest to it, by secants of logarithms.
 
     `measure` grows with the magnitude, from 0 at 0; it may be 0 below a threshold, and
@@ -32,13 +40,13 @@ def scaled(measure: Callable[[float], float], wanted: float, *, start: float, mo
     """
     low, high = None, None
     magnitude, best = min(start, most), Found(0.0, 0.0)
-    for _ in range(TRIES):
+    for _ in range(tries):
         ratio = measure(magnitude)
         if not math.isinf(ratio) and abs(math.log(max(ratio, 1e-9) / wanted)) < abs(
             math.log(max(best.ratio, 1e-9) / wanted)
         ):
             best = Found(magnitude, ratio)
-        if abs(math.log(max(best.ratio, 1e-9) / wanted)) < CLOSE or (magnitude == most and ratio < wanted):
+        if abs(math.log(max(best.ratio, 1e-9) / wanted)) < close or (magnitude == most and ratio < wanted):
             break
         if math.isinf(ratio):
             high = (math.log(magnitude), math.log(8 * wanted))
