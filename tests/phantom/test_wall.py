@@ -4,7 +4,13 @@ import ast
 from pathlib import Path
 
 ROOM = Path(__file__).parents[2] / "surgisim" / "phantom"
-ALLOWED = ("surgisim.phantom", "surgisim.artifacts", "surgisim.config.phantom", "surgisim.problem")
+ALLOWED = (
+    "surgisim.phantom",
+    "surgisim.artifacts",
+    "surgisim.config.phantom",
+    "surgisim.config.invent",
+    "surgisim.problem",
+)
 
 
 def imports(path):

@@ -1,0 +1,32 @@
+"""Settings of the blind generator: one concealed recording of a seed."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from surgisim.config.base import Settings
+
+
+class Invent(Settings):
+    seed: int = Field(1, ge=0)
+    """Decides all cases [1]."""
+    case: int = Field(0, ge=0)
+    """Number of the case; twenty in a row hold the whole mixture [1]."""
+    fps: float = Field(25.0, gt=0)
+    """Frames per second [1/s]."""
+    points: int = Field(200, ge=1)
+    """Tracked points of the upper side [1]."""
+    noise: float = Field(3e-4, ge=0)
+    """Standard deviation of the tracking noise along each axis [m]."""
+    snr_low: float = Field(1.0, gt=0)
+    """Least signal-to-noise ratio asked of an effect: RMS of what it changes over the noise [1]."""
+    snr_high: float = Field(6.0, gt=0)
+    """Greatest; between them the logarithm is uniform [1]."""
+    spacing: float = Field(3e-3, gt=0)
+    """Edge of the finite elements [m]."""
+    spacing_coarse: float = Field(4.5e-3, gt=0)
+    """The same of the quick runs that find the magnitude [m]."""
+    only: Annotated[list[str], Field(max_length=40)] = []
+    """Names of effects that may be concealed; all if empty [name]."""
+    faint: bool = False
+    """Whether effects are concealed too that can hardly be seen at a tissue's magnitudes [1]."""

@@ -1,0 +1,183 @@
+"""Invent a recording that conceals something, and write down what.
+
+Every part draws from a generator of its own, so that neither the scene nor the nuisances depend on the effect.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from surgisim.config.invent import Invent
+from surgisim.phantom import folder, nuisance
+from surgisim.phantom.effect import Hidden, catalogue, conceal, described
+from surgisim.phantom.follow import follow
+from surgisim.phantom.mixture import concealed
+from surgisim.phantom.model import model
+from surgisim.phantom.scene import Scene, draw
+from surgisim.phantom.snr import Found, scaled, signal
+from surgisim.problem import Problem
+
+Progress = Callable[[float, float, str], None]
+PLACES = 3
+"""Places that an effect may try before it is taken as strong as it gets."""
+NEAR = 0.10
+"""How near the fine run's ratio must come to the wanted one; otherwise it is run again."""
+FINE_RUNS = 4
+"""At most."""
+
+
+@dataclass(frozen=True)
+class Invented:
+    name: str
+    recording: dict[str, bytes]
+    """File name -> bytes of the recording's folder."""
+    truth: bytes
+    """truth.json: what is concealed; names the digest of `tracks`."""
+    tracks: bytes
+    """truth.npz: plain and true, noise-free paths without and with the effects [m], (K, T, 3) float32."""
+
+
+@dataclass(frozen=True)
+class Aim:
+    """One effect with the ratio it was asked for and the one that quick runs give it alone."""
+
+    hidden: Hidden
+    asked: float
+    alone: float
+
+
+def name_of(seed: int, case: int) -> str:
+    """Tells nothing of the case."""
+    return "r-" + hashlib.sha256(f"{seed}/{case}".encode()).hexdigest()[:8]
+
+
+def invent(settings: Invent, progress: Progress | None = None, names: tuple[str, ...] | None = None) -> Invented:
+    """The case `settings.case` of `settings.seed`: the same bytes every time on one machine.
+
+    `names` conceals these effects instead of what the mixture says, in the same scene with the same nuisances.
+    Raises Problem when no place is found where the tissue bears the effect.
+    """
+    spacings = settings.spacing, settings.spacing_coarse
+    scene = draw(generator(settings, "scene"), fps=settings.fps, points=settings.points, spacings=spacings)
+    plain = follow(model(scene, settings.spacing), progress, "moving the tissue without the effect")
+    free = nuisance.visible(scene, plain, generator(settings, "visible"))
+    if names is None:
+        names = concealed(settings.seed, settings.case, tuple(settings.only), settings.faint)
+    true, aims = _with_effects(settings, scene, names, plain, free, progress)
+    seen = nuisance.seen(scene, true, settings.noise, generator(settings, "noise"))
+    name = name_of(settings.seed, settings.case)
+    files = folder.recording(scene, name, seen, free, settings.noise, model(scene, settings.spacing))
+    tracks = folder.npz(plain=plain.astype(np.float32), true=true.astype(np.float32))
+    truth = _truth(settings, scene, name, aims, plain, true, free, tracks)
+    return Invented(name, files, (json.dumps(truth, indent=1, allow_nan=False) + "\n").encode(), tracks)
+
+
+def generator(settings: Invent, part: str) -> np.random.Generator:
+    """For one part of one case."""
+    return np.random.default_rng([settings.seed, settings.case, *part.encode()])
+
+
+def ratio(settings: Invent, scene: Scene, difference: np.ndarray, free: np.ndarray, *, held_out: bool = False) -> float:
+    """Signal over noise on the frames that are fitted, or on those held out."""
+    span = slice(scene.split, None) if held_out else slice(0, scene.split)
+    return signal(difference[:, span], free[:, span]) / max(settings.noise, 1e-9)
+
+
+def _with_effects(settings, scene, names, plain, free, progress) -> tuple[np.ndarray, tuple[Aim, ...]]:
+    """Paths with the effects, and the effects."""
+    if not names:
+        return plain, ()
+    rng = generator(settings, "effect")
+    coarse = model(scene, settings.spacing_coarse)
+    coarse_plain = follow(coarse, progress, "a quick run without the effect")
+
+    def measure(*hidden: Hidden) -> float:
+        try:
+            moved = follow(conceal(coarse, hidden), progress, "a quick run to find how strong")
+        except Problem:
+            # The tissue does not bear it.
+            return math.inf
+        return ratio(settings, scene, moved - coarse_plain, free)
+
+    aims = tuple(_aim(settings, scene, name, rng, measure) for name in names)
+    # Fine elements answer a little differently from coarse ones; one factor for all effects mends that.
+    wanted = _within_reach(aims[0]) if len(aims) == 1 else measure(*(a.hidden for a in aims))
+    runs: dict[float, tuple[np.ndarray, tuple[Hidden, ...]]] = {}
+
+    def measure_fine(factor: float) -> float:
+        hidden = tuple(_times(a.hidden, factor) for a in aims)
+        try:
+            true = follow(
+                conceal(model(scene, settings.spacing), hidden), progress, "moving the tissue with the effect"
+            )
+        except Problem:
+            return math.inf
+        runs[factor] = true, hidden
+        return ratio(settings, scene, true - plain, free)
+
+    most = max(catalogue()[a.hidden.name].most / a.hidden.magnitude for a in aims)
+    found = scaled(measure_fine, wanted, start=1.0, most=most, close=NEAR, tries=FINE_RUNS)
+    if not found.magnitude:
+        raise Problem(
+            f"phantom: case {settings.case} of seed {settings.seed}: the tissue does not bear {' and '.join(names)} in "
+            "fine elements. Take another seed, or a lower snr_high."
+        )
+    true, hidden = runs[found.magnitude]
+    return true, tuple(Aim(h, a.asked, a.alone) for h, a in zip(hidden, aims, strict=True))
+
+
+def _aim(settings: Invent, scene: Scene, name: str, rng: np.random.Generator, measure) -> Aim:
+    """An effect somewhere, as strong as asked, or as strong as it gets."""
+    effect = catalogue()[name]
+    share = rng.uniform()
+    best = None
+    for _ in range(PLACES):
+        hidden = effect.draw(scene, rng, name)
+        reach = measure(hidden.scaled(effect.most))
+        if best is None or reach > best[1]:
+            best = hidden, reach
+        if reach > 1.1 * settings.snr_low:
+            break
+    hidden, reach = best
+    if reach <= 1.1 * settings.snr_low:
+        return Aim(hidden.scaled(effect.most), settings.snr_low, reach)
+    top = max(min(settings.snr_high, 0.95 * reach), settings.snr_low)
+    asked = settings.snr_low * (top / settings.snr_low) ** share
+    found: Found = scaled(
+        lambda magnitude: measure(hidden.scaled(magnitude)), asked, start=effect.start, most=effect.most
+    )
+    return Aim(hidden.scaled(found.magnitude), asked, found.ratio)
+
+
+def _within_reach(aim: Aim) -> float:
+    """What was asked for, or what quick runs gave where that cannot be had."""
+    return aim.asked if abs(math.log(aim.alone / aim.asked)) < NEAR else aim.alone
+
+
+def _times(hidden: Hidden, factor: float) -> Hidden:
+    return hidden.scaled(min(factor * hidden.magnitude, catalogue()[hidden.name].most))
+
+
+def _truth(settings, scene, name, aims, plain, true, free, tracks) -> dict:
+    law, difference = scene.law, true - plain
+    kind = "nothing" if not aims else "two" if len(aims) == 2 else "one"
+    if any(catalogue()[a.hidden.name].outside for a in aims):
+        kind = "outside"
+    return {
+        "format": "surgisim-blind-truth/1",
+        "recording": name,
+        "seed": settings.seed,
+        "case": settings.case,
+        "kind": kind,
+        "effects": [described(scene, a.hidden) | {"snr_asked": a.asked, "snr_alone_coarse": a.alone} for a in aims],
+        "snr": ratio(settings, scene, difference, free),
+        "snr_held_out": ratio(settings, scene, difference, free, held_out=True),
+        "noise": settings.noise,
+        "base": {"E": law.E, "nu": law.nu, "eta": law.eta, "density": law.density},
+        "phases": [{"begin": h.begin, "arrive": h.arrive, "release": h.release} for h in scene.holds],
+        "tracks_sha256": hashlib.sha256(tracks).hexdigest(),
+    }

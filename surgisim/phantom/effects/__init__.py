@@ -1,0 +1,1 @@
+"""Physics that a recording may conceal, one file an effect."""
