@@ -140,8 +140,8 @@ def test_a_mistake_in_the_config_is_one_sentence(tree):
 def test_every_stage_has_a_rule_and_every_rule_a_log_a_benchmark_and_a_digest():
     rules = "".join(path.read_text() for path in (ROOT / "workflow" / "rules").glob("*.smk"))
     blocks = {block.split(":")[0]: block for block in rules.split("\nrule ")[1:]}
-    assert {path.stem for path in (ROOT / "stages").glob("*.py")} == STAGES
-    assert set(blocks) == STAGES | {"verification", "verification_case"}
+    assert {path.stem for path in (ROOT / "stages").glob("*.py")} == STAGES | {"invent"}
+    assert set(blocks) == STAGES | {"invent", "verification", "verification_case"}
     for stage, block in blocks.items():
         for key in ("log:", "benchmark:", "conda:", "mem_mb=", "code="):
             assert key in block, (stage, key)
