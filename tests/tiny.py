@@ -12,6 +12,8 @@ from surgisim.physics.catalogue import catalogue, defaults
 from surgisim.physics.place import Place
 
 TERMS = catalogue()
+CLEAR = {"sliding_base": {"stiffness": 300.0, "cap": 0.03}}
+"""Friction at which the block slips or sticks, and rounding does not decide which."""
 BASE = {"corotated": {"E": 6000.0, "nu": 0.4}, "newtonian": {"eta": 6.0}}
 DENSITY, STEP, FRAMES, PER_FRAME = 1050.0, 4e-4, 11, 100
 MIDDLE = Place((0.002, 0.001, 0.068), 0.006)
@@ -33,14 +35,14 @@ def under(name: str) -> tuple[str, ...]:
 
 
 def beside(name: str) -> tuple[str, ...]:
-    """The base laws, this one and a few others: laws in packs of five."""
+    """The base laws, this one and a few others: laws in packs of seven."""
     more = [n for n in TERMS if n not in BASE]
-    first = more.index(name) // 5 * 5 if name in more else 0
-    return (*BASE, *more[first : first + 5])
+    first = more.index(name) // 7 * 7 if name in more else 0
+    return (*BASE, *more[first : first + 7])
 
 
 def on(names) -> Values:
-    return {n: {**defaults(TERMS[n]), **TERMS[n].example, **BASE.get(n, {})} for n in names}
+    return {n: {**defaults(TERMS[n]), **TERMS[n].example, **CLEAR.get(n, {}), **BASE.get(n, {})} for n in names}
 
 
 def off(name: str) -> dict[str, float]:
