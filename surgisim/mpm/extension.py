@@ -18,9 +18,8 @@ from scipy.ndimage import binary_dilation
 from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 
-SOLID = 0.05
-"""Share of the largest nodal mass above which a node moves by itself. With .02 a corner of a body turned against its
-grid left a node with .004, whose viscosity wanted steps half as long."""
+SOLID = 0.02
+"""Share of the largest nodal mass above which a node moves by itself."""
 PASSES = 4
 """Rings of nodes around the body that are carried along."""
 
