@@ -28,6 +28,8 @@ from surgisim.problem import Problem
 wp.config.log_level = wp.LOG_WARNING
 
 NEVER = 2**31 - 1
+BLOCK = 64
+"""Particles that a GPU steps in one block: few, so that no multiprocessor waits for the last one."""
 
 State = tuple[np.ndarray, ...]
 """u, v over solid nodes, (A, 3) each, and, where a law has memory, q, (P, S)."""
@@ -115,6 +117,10 @@ class Simulator(Nodes):
             local, links = (_padded(a, ABREAST) for a in (local, links))
             self.order, self.lumps = self._lumps(local)
         self.index, self.link = self._put(local[self.order], int), self._put(links[self.order], s.Link)
+        if self.lumps:
+            # Neighbouring threads, which step neighbouring particles, read neighbouring numbers; cells read whole rows.
+            self.lumps.link = self.link
+            self.index, self.link = self._by_column(local, int), self._by_column(links, s.Link)
         self.volume, self.rest_d = self._put(self.volume_p[self.order], s.real), self._put(self.rest[self.order], s.Vec)
         ends = np.linspace(0, self.count, (threads if self.scatter else 1) + 1).astype(int)
         self.parts = [(int(a), int(b - a)) for a, b in pairwise(ends)]
@@ -137,7 +143,8 @@ class Simulator(Nodes):
         # Big-endian bytes compare as the numbers do: neighbours stay neighbours.
         rows = np.ascontiguousarray(local, ">i4").view(np.dtype((np.void, 4 * local.shape[1]))).ravel()
         _, first, cell = np.unique(rows, return_index=True, return_inverse=True)
-        nodes = local[first].ravel()
+        # The k-th node of all cells, one after the other: neighbouring nodes find theirs side by side.
+        nodes = local[first].T.ravel()
         entry = np.argsort(nodes, kind="stable")
         return np.argsort(cell, kind="stable"), SimpleNamespace(
             shape=(len(first), local.shape[1]),
@@ -278,6 +285,10 @@ class Simulator(Nodes):
         kind = np.int32 if dtype is int else self.real
         return wp.array(np.ascontiguousarray(array, kind), dtype=dtype, device=self.device)
 
+    def _by_column(self, rows: np.ndarray, dtype):
+        """Rows in the device's order, (P, K), laid out column after column."""
+        return self._put(np.swapaxes(rows[self.order], 0, 1), dtype).transpose()
+
     def _zeros(self, shape, dtype):
         return wp.zeros(shape, dtype=dtype, device=self.device)
 
@@ -346,14 +357,14 @@ class Simulator(Nodes):
         sums = [self._zeros(m.shape[0] * m.shape[1], self.types.Vec) for _ in at_nodes]
         lump, gather = (getattr(self.nodes, f"{name}{way}") for name in ("lump", "gather"))
         return [
-            [wp.launch(lump, m.shape, [m.begin, self.link, *per_particle, *sums], **launch)],
+            [wp.launch(lump, m.shape, [m.begin, m.link, *per_particle, *sums], **launch)],
             [wp.launch(gather, len(self.place), [m.start, m.entry, *sums, *at_nodes], **launch)],
         ]
 
     def _particles(self, kernel, inputs: list, outs: list) -> list:
         """One recorded launch for each share of the particles."""
         return [
-            wp.launch(kernel, count, mine + outs, device=self.device, record_cmd=True)
+            wp.launch(kernel, count, mine + outs, device=self.device, record_cmd=True, block_dim=BLOCK)
             for mine, (_, count) in zip(inputs, self.parts, strict=True)
         ]
 
