@@ -75,7 +75,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         for p in range(begin[c], begin[c + 1]):
             w = link[p, k]
             total += w[0] * push[p] - stress[p] * Vec(w[1], w[2], w[3])
-        lumped[k * (begin.shape[0] - 1) + c] = total
+        lumped[c * link.shape[1] + k] = total
 
     @wp.kernel(module="unique", enable_backward=False)
     def gather(
@@ -165,9 +165,8 @@ def node_kernels(precision: str) -> SimpleNamespace:
             g = Vec(w[1], w[2], w[3])
             du += F_bar[p] * g + w[0] * x_bar[p]
             dv += Fdot_bar[p] * g + w[0] * y_bar[p]
-        at = k * (begin.shape[0] - 1) + c
-        lumped_u[at] = du
-        lumped_v[at] = dv
+        lumped_u[c * link.shape[1] + k] = du
+        lumped_v[c * link.shape[1] + k] = dv
 
     @wp.kernel(module="unique", enable_backward=False)
     def gather_back(

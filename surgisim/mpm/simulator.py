@@ -143,8 +143,7 @@ class Simulator(Nodes):
         # Big-endian bytes compare as the numbers do: neighbours stay neighbours.
         rows = np.ascontiguousarray(local, ">i4").view(np.dtype((np.void, 4 * local.shape[1]))).ravel()
         _, first, cell = np.unique(rows, return_index=True, return_inverse=True)
-        # The k-th node of all cells, one after the other: neighbouring nodes find theirs side by side.
-        nodes = local[first].T.ravel()
+        nodes = local[first].ravel()
         entry = np.argsort(nodes, kind="stable")
         return np.argsort(cell, kind="stable"), SimpleNamespace(
             shape=(len(first), local.shape[1]),
@@ -357,7 +356,14 @@ class Simulator(Nodes):
         sums = [self._zeros(m.shape[0] * m.shape[1], self.types.Vec) for _ in at_nodes]
         lump, gather = (getattr(self.nodes, f"{name}{way}") for name in ("lump", "gather"))
         return [
-            [wp.launch(lump, m.shape, [m.begin, m.link, *per_particle, *sums], **launch)],
+            [
+                wp.launch(
+                    lump,
+                    m.shape,
+                    [m.begin, m.link, *per_particle, *sums],
+                    **launch,
+                )
+            ],
             [wp.launch(gather, len(self.place), [m.start, m.entry, *sums, *at_nodes], **launch)],
         ]
 
