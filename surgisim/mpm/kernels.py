@@ -68,6 +68,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         link: wp.array2d(dtype=Link),
         stress: wp.array(dtype=Mat),
         push: wp.array(dtype=Vec),
+        stride: int,
         lumped: wp.array(dtype=Vec),
     ):
         c, k = wp.tid()
@@ -75,7 +76,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         for p in range(begin[c], begin[c + 1]):
             w = link[p, k]
             total += w[0] * push[p] - stress[p] * Vec(w[1], w[2], w[3])
-        lumped[c * link.shape[1] + k] = total
+        lumped[c * stride + k] = total
 
     @wp.kernel(module="unique", enable_backward=False)
     def gather(
@@ -154,6 +155,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         Fdot_bar: wp.array(dtype=Mat),
         x_bar: wp.array(dtype=Vec),
         y_bar: wp.array(dtype=Vec),
+        stride: int,
         lumped_u: wp.array(dtype=Vec),
         lumped_v: wp.array(dtype=Vec),
     ):
@@ -165,8 +167,8 @@ def node_kernels(precision: str) -> SimpleNamespace:
             g = Vec(w[1], w[2], w[3])
             du += F_bar[p] * g + w[0] * x_bar[p]
             dv += Fdot_bar[p] * g + w[0] * y_bar[p]
-        lumped_u[c * link.shape[1] + k] = du
-        lumped_v[c * link.shape[1] + k] = dv
+        lumped_u[c * stride + k] = du
+        lumped_v[c * stride + k] = dv
 
     @wp.kernel(module="unique", enable_backward=False)
     def gather_back(
@@ -243,6 +245,69 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         F = Mat(f00, f01, f02, f10, f11, f12, f20, f21, f22)
         Fdot = Mat(d00, d01, d02, d10, d11, d12, d20, d21, d22)
         return F, Fdot
+
+    @wp.func
+    def kinematics_and_forces(
+        u: wp.array2d(dtype=Vec),
+        v: wp.array2d(dtype=Vec),
+        f_bar: wp.array(dtype=Vec),
+        index: wp.array2d(dtype=int),
+        link: wp.array2d(dtype=Link),
+        slot: int,
+        p: int,
+    ):
+        f00, f01, f02 = real(1.0), real(0.0), real(0.0)
+        f10, f11, f12 = real(0.0), real(1.0), real(0.0)
+        f20, f21, f22 = real(0.0), real(0.0), real(1.0)
+        d00, d01, d02 = real(0.0), real(0.0), real(0.0)
+        d10, d11, d12 = real(0.0), real(0.0), real(0.0)
+        d20, d21, d22 = real(0.0), real(0.0), real(0.0)
+        a00, a01, a02 = real(0.0), real(0.0), real(0.0)
+        a10, a11, a12 = real(0.0), real(0.0), real(0.0)
+        a20, a21, a22 = real(0.0), real(0.0), real(0.0)
+        g0, g1, g2 = real(0.0), real(0.0), real(0.0)
+        for block in range(index.shape[1] / wp.static(AT_ONCE)):
+            for j in range(wp.static(AT_ONCE)):
+                k = block * wp.static(AT_ONCE) + j
+                i = index[p, k]
+                w = link[p, k]
+                a = u[slot, i]
+                b = v[slot, i]
+                f = f_bar[i]
+                f00 += a[0] * w[1]
+                f01 += a[0] * w[2]
+                f02 += a[0] * w[3]
+                f10 += a[1] * w[1]
+                f11 += a[1] * w[2]
+                f12 += a[1] * w[3]
+                f20 += a[2] * w[1]
+                f21 += a[2] * w[2]
+                f22 += a[2] * w[3]
+                d00 += b[0] * w[1]
+                d01 += b[0] * w[2]
+                d02 += b[0] * w[3]
+                d10 += b[1] * w[1]
+                d11 += b[1] * w[2]
+                d12 += b[1] * w[3]
+                d20 += b[2] * w[1]
+                d21 += b[2] * w[2]
+                d22 += b[2] * w[3]
+                a00 -= f[0] * w[1]
+                a01 -= f[0] * w[2]
+                a02 -= f[0] * w[3]
+                a10 -= f[1] * w[1]
+                a11 -= f[1] * w[2]
+                a12 -= f[1] * w[3]
+                a20 -= f[2] * w[1]
+                a21 -= f[2] * w[2]
+                a22 -= f[2] * w[3]
+                g0 += f[0] * w[0]
+                g1 += f[1] * w[0]
+                g2 += f[2] * w[0]
+        F = Mat(f00, f01, f02, f10, f11, f12, f20, f21, f22)
+        Fdot = Mat(d00, d01, d02, d10, d11, d12, d20, d21, d22)
+        A = Mat(a00, a01, a02, a10, a11, a12, a20, a21, a22)
+        return F, Fdot, A, Vec(g0, g1, g2)
 
     @wp.func
     def carried(
@@ -363,16 +428,7 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         p = begin + wp.tid()
         n = clock[1]
         slot = clock[0] % slots
-        F, Fdot = kinematics(u, v, index, link, slot, p)
-        A = Mat()
-        b = Vec()
-        for block in range(index.shape[1] / wp.static(AT_ONCE)):
-            for j in range(wp.static(AT_ONCE)):
-                k = block * wp.static(AT_ONCE) + j
-                w = link[p, k]
-                f = f_bar[index[p, k]]
-                A -= wp.outer(f, Vec(w[1], w[2], w[3]))
-                b += w[0] * f
+        F, Fdot, A, b = kinematics_and_forces(u, v, f_bar, index, link, slot, p)
         held = anchors.member[p]
         x = Vec()
         y = Vec()

@@ -143,13 +143,18 @@ class Simulator(Nodes):
         # Big-endian bytes compare as the numbers do: neighbours stay neighbours.
         rows = np.ascontiguousarray(local, ">i4").view(np.dtype((np.void, 4 * local.shape[1]))).ravel()
         _, first, cell = np.unique(rows, return_index=True, return_inverse=True)
+        # Rows of odd length: at powers of two the sums of neighbouring cells push each other out of the cache.
+        width = local.shape[1]
+        stride = width | 1
         nodes = local[first].ravel()
+        at = (np.arange(len(first))[:, None] * stride + np.arange(width)).ravel()
         entry = np.argsort(nodes, kind="stable")
         return np.argsort(cell, kind="stable"), SimpleNamespace(
-            shape=(len(first), local.shape[1]),
+            shape=(len(first), width),
+            stride=stride,
             begin=self._put(np.searchsorted(np.sort(cell), np.arange(len(first) + 1)), int),
             start=self._put(np.searchsorted(nodes[entry], np.arange(len(self.place) + 1)), int),
-            entry=self._put(entry, int),
+            entry=self._put(at[entry], int),
         )
 
     def node_mass(self, density: np.ndarray) -> np.ndarray:
@@ -353,14 +358,14 @@ class Simulator(Nodes):
     def _gathered(self, way: str, per_particle: list, at_nodes: list) -> list:
         """Recorded launches that sum over the particles of every node, in two phases."""
         m, launch = self.lumps, {"device": self.device, "record_cmd": True}
-        sums = [self._zeros(m.shape[0] * m.shape[1], self.types.Vec) for _ in at_nodes]
+        sums = [self._zeros(m.shape[0] * m.stride, self.types.Vec) for _ in at_nodes]
         lump, gather = (getattr(self.nodes, f"{name}{way}") for name in ("lump", "gather"))
         return [
             [
                 wp.launch(
                     lump,
                     m.shape,
-                    [m.begin, m.link, *per_particle, *sums],
+                    [m.begin, m.link, *per_particle, m.stride, *sums],
                     **launch,
                 )
             ],
