@@ -13,6 +13,8 @@ hang on the same nodes (those of one cell) are lumped first, one sum for each of
 its lumps. On a CPU, where a launch is one thread, particles add straight into the nodes instead: as repeatable, and
 without storing a stress; each of several threads has a share of the particles and its own part of the sums.
 
+The clock moves on where nobody reads it: in a kernel of its own on a CPU, while particles are lumped on a GPU.
+
 State lives in a ring of slots, (L, N): slot n % L is read and slot (n + 1) % L written, which
 serves a plain run (L = 2) and a recorded segment (L = steps + 1) alike.
 """
@@ -64,6 +66,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def lump(
+        clock: wp.array(dtype=int),
         begin: wp.array(dtype=int),
         link: wp.array2d(dtype=Link),
         stress: wp.array(dtype=Mat),
@@ -72,6 +75,9 @@ def node_kernels(precision: str) -> SimpleNamespace:
         lumped: wp.array(dtype=Vec),
     ):
         c, k = wp.tid()
+        if c + k == 0:
+            clock[0] = clock[0] + 1
+            clock[1] = clock[1] + 1
         total = Vec()
         for p in range(begin[c], begin[c + 1]):
             w = link[p, k]
@@ -94,6 +100,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
     @wp.kernel(module="unique", enable_backward=False)
     def step(
         clock: wp.array(dtype=int),
+        ahead: int,
         mass: wp.array(dtype=real),
         gravity: Vec,
         plain: int,
@@ -104,7 +111,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         v: wp.array2d(dtype=Vec),
     ):
         i = wp.tid()
-        n = clock[0]
+        n = clock[0] - ahead
         here = n % slots
         there = (n + 1) % slots
         total = Vec()
@@ -149,6 +156,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def lump_back(
+        clock: wp.array(dtype=int),
         begin: wp.array(dtype=int),
         link: wp.array2d(dtype=Link),
         F_bar: wp.array(dtype=Mat),
@@ -160,6 +168,9 @@ def node_kernels(precision: str) -> SimpleNamespace:
         lumped_v: wp.array(dtype=Vec),
     ):
         c, k = wp.tid()
+        if c + k == 0:
+            clock[0] = clock[0] - 1
+            clock[1] = clock[1] - 1
         du = Vec()
         dv = Vec()
         for p in range(begin[c], begin[c + 1]):

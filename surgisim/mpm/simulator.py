@@ -255,6 +255,7 @@ class Simulator(Nodes):
             length = min(stretch, count - k * stretch)
             self._load(task, starts[k], step + k * stretch)
             task.forward.march(length)
+            wp.launch(tick, 1, [self.clock, -1], device=self.device)
             back.commands.march(length)
 
     def _stretch(self, per: int, memory_mb: float) -> int:
@@ -316,14 +317,16 @@ class Simulator(Nodes):
         inputs = [[*shared, part, begin, u, v, q] for part, (begin, _) in enumerate(self.parts)]
         launch = {"device": self.device, "record_cmd": True}
         outs = [self.stress, self.push, self.force, self.trouble]
-        nodes = [self.clock, self.mass, self.gravity, self.rule.shape[1], s.real(drive.step), slots, self.force, u, v]
+        ahead = int(self.lumps is not None)
+        nodes = [self.clock, ahead, self.mass, self.gravity, self.rule.shape[1], s.real(drive.step), slots, self.force]
         forward = [
             self._particles(self.kernels.step, inputs, outs),
-            [wp.launch(self.nodes.step, len(self.place), nodes, **launch)],
-            [wp.launch(tick, 1, [self.clock, 1], **launch)],
+            [wp.launch(self.nodes.step, len(self.place), [*nodes, u, v], **launch)],
         ]
         if self.lumps:
             forward[1:1] = self._gathered("", [self.stress, self.push], [self.force])
+        else:
+            forward.append([wp.launch(tick, 1, [self.clock, 1], **launch)])
         return _Task(slots, u, v, q, inputs, March(forward, self.device))
 
     def _back(self, task: "_Task", drive: Drive, springs: bool) -> "_Back":
@@ -347,12 +350,13 @@ class Simulator(Nodes):
         before = [self.clock, self.mass, *gravity, s.real(drive.step), task.slots, task.v, u, v, f, m]
         outs = [f, F, G, x, y, u, v, q, theta, rho, path, hold, stiffness]
         commands = [
-            [wp.launch(tick, 1, [self.clock, -1], **launch)],
             [wp.launch(self.nodes.before, len(self.place), before, **launch)],
             self._particles(self.kernels.adjoint, task.inputs, outs),
         ]
         if self.lumps:
             commands += self._gathered("_back", [F, G, x, y], [u, v])
+        else:
+            commands.append([wp.launch(tick, 1, [self.clock, -1], **launch)])
         return _Back(u, v, q, theta, path, hold, stiffness, m, rho, March(commands, self.device))
 
     def _gathered(self, way: str, per_particle: list, at_nodes: list) -> list:
@@ -365,7 +369,7 @@ class Simulator(Nodes):
                 wp.launch(
                     lump,
                     m.shape,
-                    [m.begin, m.link, *per_particle, m.stride, *sums],
+                    [self.clock, m.begin, m.link, *per_particle, m.stride, *sums],
                     **launch,
                 )
             ],
