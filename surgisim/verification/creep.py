@@ -32,7 +32,7 @@ RAMP, SETTLED, SAMPLES = 0.1, 0.3, 200
 E, ETA = 30000.0, 300.0
 SAFETY = 0.5
 """Share of the engine's stable step: that one is not stable at a free rim where viscosity sets it."""
-FIRM = 100.0
+FIRM = 15.0
 """Anchors as stiff as this times their default, so that what they hold hardly gives way; their pull is then a
 difference of nearly equal numbers, which is why everything here is computed in double precision."""
 ELASTIC = {"corotated": {"E": E, "nu": 0.0}}
@@ -67,7 +67,8 @@ def relaxation(values: dict, solid: LinearSolid, spacing: float, duration: float
     laid = rod(block((LENGTH + spacing, SIDE, SIDE), spacing, spacing), values, precision="double")
     drive, time = _drive(laid, STRAIN * LENGTH, duration)
     far = laid.made.body.rest[:, 0] > LENGTH
-    drive = replace(drive, member=laid.made.body.held.astype(np.int32) | (far.astype(np.int32) << 1))
+    member = laid.made.body.held.astype(np.int32) | (far.astype(np.int32) << 1)
+    drive = replace(drive, member=member, share=(member > 0).astype(float))
     out = laid.made.simulator.run(laid.made.theta(values), drive)
     u = _along(laid, laid.made.body.rest.astype(float), out.u)
     mass = laid.made.body.volume.astype(float) * DENSITY
