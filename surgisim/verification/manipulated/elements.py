@@ -12,6 +12,7 @@ from surgisim.problem import Problem
 from surgisim.verification.manipulated.mesh import Mesh, mesh
 from surgisim.verification.manipulated.scene import FINE, FPS, Scene
 
+
 def follow(
     scene: Scene,
     spacing: float,
