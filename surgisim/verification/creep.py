@@ -30,8 +30,6 @@ TITLE = "Relaxation and creep"
 LENGTH, SIDE, STRAIN, GRAVITY = 0.036, 0.009, 1e-3, 1.0
 RAMP, SETTLED, SAMPLES = 0.1, 0.3, 200
 E, ETA = 30000.0, 300.0
-SAFETY = 0.5
-"""Share of the engine's stable step: that one is not stable at a free rim where viscosity sets it."""
 FIRM = 15.0
 """Anchors as stiff as this times their default, so that what they hold hardly gives way; their pull is then a
 difference of nearly equal numbers, which is why everything here is computed in double precision."""
@@ -117,7 +115,7 @@ def _drive(laid: Rod, by: float, duration: float) -> tuple[Drive, np.ndarray]:
     motion = Motion(center, np.array([SIDE]), position[None], active, np.ones(1), "given")
     rough = laid.made.drive(motion, laid.values, fps=1 / time[1], per_frame=1)
     springs = FIRM * rough.stiffness
-    step = min(SAFETY * laid.step, 0.5 / np.sqrt(springs.max()))
+    step = min(laid.step, 0.5 / np.sqrt(springs.max()))
     drive = laid.made.drive(motion, laid.values, fps=1 / time[1], per_frame=int(np.ceil(time[1] / step)))
     return replace(drive, stiffness=springs), time
 
@@ -171,7 +169,4 @@ strain of the middle half. Hung up by one end under gravity ({result["gravity"]}
 three quarters against the closed form; a solid that has no viscosity starts where it hangs before anything relaxes.
 Errors are shares of the largest value; bound: 1 %.
 
-{table(head, rows)}
-What does not hold: where viscosity alone sets the engine's stable step, a rod this thin is not stable at it (it needs
-about 1 / 1.4 of it, where hardly filled nodes at the rim are as viscous as full ones), so these runs take half of it.
-"""
+{table(head, rows)}"""
