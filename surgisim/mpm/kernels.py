@@ -8,10 +8,10 @@ q_p is what the laws remember, b_p their forces, and h_p the springs that hold a
 the base) to their path, so that the constraint acts on the interpolated motion of the driven volume itself and
 not on whole nodes, which would widen it by up to a cell.
 
-On a GPU both passes only gather: every node sums over its own links in a fixed order, so results do
-not depend on the number of threads. On a CPU, where a launch is one thread, particles add straight
-into the nodes instead: as repeatable, and without fetching every stress 27 times; each of several threads has
-a share of the particles and its own part of the sums.
+On a GPU both passes only gather, in a fixed order, so results do not depend on the number of threads: particles that
+hang on the same nodes (those of one cell) are lumped first, one sum for each of their nodes, and every node sums over
+its lumps. On a CPU, where a launch is one thread, particles add straight into the nodes instead: as repeatable, and
+without storing a stress; each of several threads has a share of the particles and its own part of the sums.
 
 State lives in a ring of slots, (L, N): slot n % L is read and slot (n + 1) % L written, which
 serves a plain run (L = 2) and a recorded segment (L = steps + 1) alike.
@@ -23,6 +23,9 @@ from types import SimpleNamespace
 import warp as wp
 
 from surgisim.physics.fold import REAL, folded
+
+ABREAST = 4
+"""Links that a GPU's thread fetches at once, rather than wait for one after the other; rows hold a multiple of it."""
 
 
 @cache
@@ -55,25 +58,37 @@ def tick(clock: wp.array(dtype=int), by: int):
 
 @cache
 def node_kernels(precision: str) -> SimpleNamespace:
-    """What happens at the nodes: `gather` and `step`, and their adjoints `before` and `gather_back`."""
+    """What happens at the nodes: `lump`, `gather`, `step`, and the adjoints `before`, `lump_back`, `gather_back`."""
     s = shapes(precision)
     real, Vec, Mat, Link = s.real, s.Vec, s.Mat, s.Link
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def lump(
+        begin: wp.array(dtype=int),
+        link: wp.array2d(dtype=Link),
+        stress: wp.array(dtype=Mat),
+        push: wp.array(dtype=Vec),
+        stride: int,
+        lumped: wp.array(dtype=Vec),
+    ):
+        c, k = wp.tid()
+        total = Vec()
+        for p in range(begin[c], begin[c + 1]):
+            w = link[p, k]
+            total += w[0] * push[p] - stress[p] * Vec(w[1], w[2], w[3])
+        lumped[c * stride + k] = total
 
     @wp.kernel(module="unique", enable_backward=False)
     def gather(
         start: wp.array(dtype=int),
         entry: wp.array(dtype=int),
-        link: wp.array2d(dtype=Link),
-        stress: wp.array(dtype=Mat),
-        push: wp.array(dtype=Vec),
+        lumped: wp.array(dtype=Vec),
         force: wp.array2d(dtype=Vec),
     ):
         i = wp.tid()
         total = Vec()
         for e in range(start[i], start[i + 1]):
-            p = entry[e] / link.shape[1]
-            w = link[p, entry[e] - p * link.shape[1]]
-            total += w[0] * push[p] - stress[p] * Vec(w[1], w[2], w[3])
+            total += lumped[entry[e]]
         force[0, i] = total
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -133,14 +148,34 @@ def node_kernels(precision: str) -> SimpleNamespace:
             m_bar[i] = m_bar[i] - wp.dot(total, gained) / mass[i]
 
     @wp.kernel(module="unique", enable_backward=False)
-    def gather_back(
-        start: wp.array(dtype=int),
-        entry: wp.array(dtype=int),
+    def lump_back(
+        begin: wp.array(dtype=int),
         link: wp.array2d(dtype=Link),
         F_bar: wp.array(dtype=Mat),
         Fdot_bar: wp.array(dtype=Mat),
         x_bar: wp.array(dtype=Vec),
         y_bar: wp.array(dtype=Vec),
+        stride: int,
+        lumped_u: wp.array(dtype=Vec),
+        lumped_v: wp.array(dtype=Vec),
+    ):
+        c, k = wp.tid()
+        du = Vec()
+        dv = Vec()
+        for p in range(begin[c], begin[c + 1]):
+            w = link[p, k]
+            g = Vec(w[1], w[2], w[3])
+            du += F_bar[p] * g + w[0] * x_bar[p]
+            dv += Fdot_bar[p] * g + w[0] * y_bar[p]
+        lumped_u[c * stride + k] = du
+        lumped_v[c * stride + k] = dv
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def gather_back(
+        start: wp.array(dtype=int),
+        entry: wp.array(dtype=int),
+        lumped_u: wp.array(dtype=Vec),
+        lumped_v: wp.array(dtype=Vec),
         u_bar: wp.array2d(dtype=Vec),
         v_bar: wp.array2d(dtype=Vec),
     ):
@@ -148,15 +183,14 @@ def node_kernels(precision: str) -> SimpleNamespace:
         du = Vec()
         dv = Vec()
         for e in range(start[i], start[i + 1]):
-            p = entry[e] / link.shape[1]
-            w = link[p, entry[e] - p * link.shape[1]]
-            g = Vec(w[1], w[2], w[3])
-            du += F_bar[p] * g + w[0] * x_bar[p]
-            dv += Fdot_bar[p] * g + w[0] * y_bar[p]
+            du += lumped_u[entry[e]]
+            dv += lumped_v[entry[e]]
         u_bar[0, i] = u_bar[0, i] + du
         v_bar[0, i] = v_bar[0, i] + dv
 
-    return SimpleNamespace(gather=gather, step=step, before=before, gather_back=gather_back)
+    return SimpleNamespace(
+        lump=lump, gather=gather, step=step, before=before, lump_back=lump_back, gather_back=gather_back
+    )
 
 
 @cache
@@ -165,6 +199,7 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
     laws, s = folded(names, precision), shapes(precision)
     real, Vec, Mat, Link, Anchors = s.real, s.Vec, s.Mat, s.Link, s.Anchors
     Theta, Memory, respond, work = laws.Theta, laws.Memory, laws.respond, laws.work
+    AT_ONCE = 1 if scatter else ABREAST
 
     @wp.func
     def kinematics(
@@ -182,32 +217,97 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         d00, d01, d02 = real(0.0), real(0.0), real(0.0)
         d10, d11, d12 = real(0.0), real(0.0), real(0.0)
         d20, d21, d22 = real(0.0), real(0.0), real(0.0)
-        for k in range(index.shape[1]):
-            i = index[p, k]
-            w = link[p, k]
-            a = u[slot, i]
-            b = v[slot, i]
-            f00 += a[0] * w[1]
-            f01 += a[0] * w[2]
-            f02 += a[0] * w[3]
-            f10 += a[1] * w[1]
-            f11 += a[1] * w[2]
-            f12 += a[1] * w[3]
-            f20 += a[2] * w[1]
-            f21 += a[2] * w[2]
-            f22 += a[2] * w[3]
-            d00 += b[0] * w[1]
-            d01 += b[0] * w[2]
-            d02 += b[0] * w[3]
-            d10 += b[1] * w[1]
-            d11 += b[1] * w[2]
-            d12 += b[1] * w[3]
-            d20 += b[2] * w[1]
-            d21 += b[2] * w[2]
-            d22 += b[2] * w[3]
+        for block in range(index.shape[1] / wp.static(AT_ONCE)):
+            for j in range(wp.static(AT_ONCE)):
+                k = block * wp.static(AT_ONCE) + j
+                i = index[p, k]
+                w = link[p, k]
+                a = u[slot, i]
+                b = v[slot, i]
+                f00 += a[0] * w[1]
+                f01 += a[0] * w[2]
+                f02 += a[0] * w[3]
+                f10 += a[1] * w[1]
+                f11 += a[1] * w[2]
+                f12 += a[1] * w[3]
+                f20 += a[2] * w[1]
+                f21 += a[2] * w[2]
+                f22 += a[2] * w[3]
+                d00 += b[0] * w[1]
+                d01 += b[0] * w[2]
+                d02 += b[0] * w[3]
+                d10 += b[1] * w[1]
+                d11 += b[1] * w[2]
+                d12 += b[1] * w[3]
+                d20 += b[2] * w[1]
+                d21 += b[2] * w[2]
+                d22 += b[2] * w[3]
         F = Mat(f00, f01, f02, f10, f11, f12, f20, f21, f22)
         Fdot = Mat(d00, d01, d02, d10, d11, d12, d20, d21, d22)
         return F, Fdot
+
+    @wp.func
+    def kinematics_and_forces(
+        u: wp.array2d(dtype=Vec),
+        v: wp.array2d(dtype=Vec),
+        f_bar: wp.array(dtype=Vec),
+        index: wp.array2d(dtype=int),
+        link: wp.array2d(dtype=Link),
+        slot: int,
+        p: int,
+    ):
+        f00, f01, f02 = real(1.0), real(0.0), real(0.0)
+        f10, f11, f12 = real(0.0), real(1.0), real(0.0)
+        f20, f21, f22 = real(0.0), real(0.0), real(1.0)
+        d00, d01, d02 = real(0.0), real(0.0), real(0.0)
+        d10, d11, d12 = real(0.0), real(0.0), real(0.0)
+        d20, d21, d22 = real(0.0), real(0.0), real(0.0)
+        a00, a01, a02 = real(0.0), real(0.0), real(0.0)
+        a10, a11, a12 = real(0.0), real(0.0), real(0.0)
+        a20, a21, a22 = real(0.0), real(0.0), real(0.0)
+        g0, g1, g2 = real(0.0), real(0.0), real(0.0)
+        for block in range(index.shape[1] / wp.static(AT_ONCE)):
+            for j in range(wp.static(AT_ONCE)):
+                k = block * wp.static(AT_ONCE) + j
+                i = index[p, k]
+                w = link[p, k]
+                a = u[slot, i]
+                b = v[slot, i]
+                f = f_bar[i]
+                f00 += a[0] * w[1]
+                f01 += a[0] * w[2]
+                f02 += a[0] * w[3]
+                f10 += a[1] * w[1]
+                f11 += a[1] * w[2]
+                f12 += a[1] * w[3]
+                f20 += a[2] * w[1]
+                f21 += a[2] * w[2]
+                f22 += a[2] * w[3]
+                d00 += b[0] * w[1]
+                d01 += b[0] * w[2]
+                d02 += b[0] * w[3]
+                d10 += b[1] * w[1]
+                d11 += b[1] * w[2]
+                d12 += b[1] * w[3]
+                d20 += b[2] * w[1]
+                d21 += b[2] * w[2]
+                d22 += b[2] * w[3]
+                a00 -= f[0] * w[1]
+                a01 -= f[0] * w[2]
+                a02 -= f[0] * w[3]
+                a10 -= f[1] * w[1]
+                a11 -= f[1] * w[2]
+                a12 -= f[1] * w[3]
+                a20 -= f[2] * w[1]
+                a21 -= f[2] * w[2]
+                a22 -= f[2] * w[3]
+                g0 += f[0] * w[0]
+                g1 += f[1] * w[0]
+                g2 += f[2] * w[0]
+        F = Mat(f00, f01, f02, f10, f11, f12, f20, f21, f22)
+        Fdot = Mat(d00, d01, d02, d10, d11, d12, d20, d21, d22)
+        A = Mat(a00, a01, a02, a10, a11, a12, a20, a21, a22)
+        return F, Fdot, A, Vec(g0, g1, g2)
 
     @wp.func
     def carried(
@@ -328,14 +428,7 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         p = begin + wp.tid()
         n = clock[1]
         slot = clock[0] % slots
-        F, Fdot = kinematics(u, v, index, link, slot, p)
-        A = Mat()
-        b = Vec()
-        for k in range(index.shape[1]):
-            w = link[p, k]
-            f = f_bar[index[p, k]]
-            A -= wp.outer(f, Vec(w[1], w[2], w[3]))
-            b += w[0] * f
+        F, Fdot, A, b = kinematics_and_forces(u, v, f_bar, index, link, slot, p)
         held = anchors.member[p]
         x = Vec()
         y = Vec()

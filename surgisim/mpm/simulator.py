@@ -6,9 +6,10 @@ memory allowed is walked in several stretches.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import warp as wp
@@ -17,9 +18,9 @@ from surgisim.mpm.culprit import culprit
 from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
-from surgisim.mpm.kernels import node_kernels, particle_kernels, shapes, tick
+from surgisim.mpm.kernels import ABREAST, node_kernels, particle_kernels, shapes, tick
 from surgisim.mpm.kink import Ball
-from surgisim.mpm.march import march
+from surgisim.mpm.march import March
 from surgisim.mpm.nodes import Nodes
 from surgisim.physics.catalogue import choose, columns
 from surgisim.problem import Problem
@@ -27,9 +28,16 @@ from surgisim.problem import Problem
 wp.config.log_level = wp.LOG_WARNING
 
 NEVER = 2**31 - 1
+BLOCK = 64
+"""Particles that a GPU steps in one block: few, so that no multiprocessor waits for the last one."""
 
 State = tuple[np.ndarray, ...]
 """u, v over solid nodes, (A, 3) each, and, where a law has memory, q, (P, S)."""
+
+
+def adds(device: str) -> bool:
+    """Whether particles add into nodes there; otherwise nodes gather."""
+    return not wp.get_device(device).is_cuda
 
 
 class Breakdown(Problem):
@@ -101,14 +109,19 @@ class Simulator(Nodes):
         # A kink's weights sum to nothing: its inertia is what keeps it as slow as a cell.
         inertia = grid.spacing**2 * (links[..., 1:] ** 2).sum(-1)
         self._local, self._weight = local, np.where(local < self.rule.shape[1], links[..., 0], inertia)
-        order = np.argsort(local.ravel(), kind="stable").astype(np.int32)
-        start = np.searchsorted(local.ravel()[order], np.arange(len(self.place) + 1)).astype(np.int32)
         s = self.types
-        self.index, self.link = self._put(local, int), self._put(links, s.Link)
-        self.start, self.entry = self._put(start, int), self._put(order, int)
-        self.volume, self.rest_d = self._put(self.volume_p, s.real), self._put(self.rest, s.Vec)
         self.gravity = s.Vec(*gravity)
-        self.scatter = not wp.get_device(device).is_cuda
+        self.scatter = adds(device)
+        self.order, self.lumps = np.arange(self.count), None
+        if not self.scatter:
+            local, links = (_padded(a, ABREAST) for a in (local, links))
+            self.order, self.lumps = self._lumps(local)
+        self.index, self.link = self._put(local[self.order], int), self._put(links[self.order], s.Link)
+        if self.lumps:
+            # Neighbouring threads, which step neighbouring particles, read neighbouring numbers; cells read whole rows.
+            self.lumps.link = self.link
+            self.index, self.link = self._by_column(local, int), self._by_column(links, s.Link)
+        self.volume, self.rest_d = self._put(self.volume_p[self.order], s.real), self._put(self.rest[self.order], s.Vec)
         ends = np.linspace(0, self.count, (threads if self.scatter else 1) + 1).astype(int)
         self.parts = [(int(a), int(b - a)) for a, b in pairwise(ends)]
         self.nodes = node_kernels(precision)
@@ -124,6 +137,25 @@ class Simulator(Nodes):
         # Loaded here, once: two threads that load one module at their first launch crash the process.
         for kernel in (self.kernels.step, self.kernels.adjoint, *vars(self.nodes).values(), tick):
             wp.load_module(kernel.module, device=device)
+
+    def _lumps(self, local: np.ndarray) -> tuple[np.ndarray, SimpleNamespace]:
+        """Particles sorted by the nodes they hang on, their cells, and every node's places in the cells' sums."""
+        # Big-endian bytes compare as the numbers do: neighbours stay neighbours.
+        rows = np.ascontiguousarray(local, ">i4").view(np.dtype((np.void, 4 * local.shape[1]))).ravel()
+        _, first, cell = np.unique(rows, return_index=True, return_inverse=True)
+        # Rows of odd length: at powers of two the sums of neighbouring cells push each other out of the cache.
+        width = local.shape[1]
+        stride = width | 1
+        nodes = local[first].ravel()
+        at = (np.arange(len(first))[:, None] * stride + np.arange(width)).ravel()
+        entry = np.argsort(nodes, kind="stable")
+        return np.argsort(cell, kind="stable"), SimpleNamespace(
+            shape=(len(first), width),
+            stride=stride,
+            begin=self._put(np.searchsorted(np.sort(cell), np.arange(len(first) + 1)), int),
+            start=self._put(np.searchsorted(nodes[entry], np.arange(len(self.place) + 1)), int),
+            entry=self._put(at[entry], int),
+        )
 
     def node_mass(self, density: np.ndarray) -> np.ndarray:
         """Mass of the solid nodes [kg], (A,), for a density at every particle [kg/m^3], (P,)."""
@@ -148,16 +180,28 @@ class Simulator(Nodes):
         number stops being finite, naming step, particle and law.
         """
         last = drive.frames - 1 if last is None else last
+        states = []
+        for k, (state, _) in enumerate(self.play(theta, drive, begin=begin, first=first, last=last)):
+            states.append(state)
+            if progress and k:
+                progress(k, last - first, f"frame {first + k}/{drive.frames - 1}")
+        return Run(*(np.stack(part) for part in zip(*states, strict=True)))
+
+    def play(
+        self, theta: np.ndarray, drive: Drive, *, begin: State | None = None, first: int = 0, last: int | None = None
+    ) -> Iterator[tuple[State, wp.array]]:
+        """As `run`, frame by frame: the state, and the nodal displacement where it lies on the device, (A,) vec3."""
+        last = drive.frames - 1 if last is None else last
         task = self._task(theta, drive, 2)
         self._load(task, begin or (), first * drive.per_frame)
-        states = [self._state(task, 0)]
+        state = self._state(task, 0)
+        yield state, task.u[0]
         for frame in range(first, last):
-            march(task.forward, drive.per_frame)
-            states.append(self._state(task, (frame + 1 - first) * drive.per_frame % 2))
-            self._check(states, theta, drive, frame)
-            if progress:
-                progress(frame + 1 - first, last - first, f"frame {frame + 1}/{drive.frames - 1}")
-        return Run(*(np.stack(part) for part in zip(*states, strict=True)))
+            task.forward.march(drive.per_frame)
+            slot = (frame + 1 - first) * drive.per_frame % 2
+            before, state = state, self._state(task, slot)
+            self._check(before, state, theta, drive, frame)
+            yield state, task.u[slot]
 
     # Backward
 
@@ -204,14 +248,14 @@ class Simulator(Nodes):
         starts = [state]
         self._load(task, state, step)
         for _ in range(math.ceil(count / stretch) - 1):
-            march(task.forward, stretch)
+            task.forward.march(stretch)
             starts.append(self._state(task, stretch))
             self._load(task, starts[-1], step + (len(starts) - 1) * stretch)
         for k in reversed(range(len(starts))):
             length = min(stretch, count - k * stretch)
             self._load(task, starts[k], step + k * stretch)
-            march(task.forward, length)
-            march(back.commands, length)
+            task.forward.march(length)
+            back.commands.march(length)
 
     def _stretch(self, per: int, memory_mb: float) -> int:
         """Steps that are recorded at once, so that their states and the starts of the other stretches fit."""
@@ -230,13 +274,13 @@ class Simulator(Nodes):
         return stretch
 
     def _theta_bar(self, back: "_Back") -> np.ndarray:
-        theta_bar = back.theta.numpy().astype(float)
+        theta_bar = self._by_particle(back.theta.numpy().astype(float))
         laws = choose(self.terms)
         heavy = [columns(laws).index(f"{n}.{laws[n].mass}") for n in self.kernels.laws.mass]
         if heavy:
             # The density acts through the nodes' mass and through forces that are proportional to it.
             through = (self._weight * back.mass.numpy()[self._local]).sum(1) * self.volume_p
-            theta_bar[:, heavy] += (through + back.rho.numpy())[:, None]
+            theta_bar[:, heavy] += (through + self._by_particle(back.rho.numpy()))[:, None]
         return theta_bar
 
     # Parts
@@ -244,6 +288,10 @@ class Simulator(Nodes):
     def _put(self, array: np.ndarray, dtype):
         kind = np.int32 if dtype is int else self.real
         return wp.array(np.ascontiguousarray(array, kind), dtype=dtype, device=self.device)
+
+    def _by_column(self, rows: np.ndarray, dtype):
+        """Rows in the device's order, (P, K), laid out column after column."""
+        return self._put(np.swapaxes(rows[self.order], 0, 1), dtype).transpose()
 
     def _zeros(self, shape, dtype):
         return wp.zeros(shape, dtype=dtype, device=self.device)
@@ -262,8 +310,8 @@ class Simulator(Nodes):
         u, v = (self._zeros((slots, len(self.place)), s.Vec) for _ in range(2))
         q = self._zeros((slots, self.count if self.width else 1), self.kernels.laws.Memory)
         shared = [
-            self.clock, self.index, self.link, self.volume, self._put(density, s.real), self.rest_d,
-            self._put(theta, s.real), self._anchors(drive), s.real(drive.step), slots,
+            self.clock, self.index, self.link, self.volume, self._put(density[self.order], s.real), self.rest_d,
+            self._put(theta[self.order], s.real), self._anchors(drive), s.real(drive.step), slots,
         ]  # fmt: skip
         inputs = [[*shared, part, begin, u, v, q] for part, (begin, _) in enumerate(self.parts)]
         launch = {"device": self.device, "record_cmd": True}
@@ -274,10 +322,9 @@ class Simulator(Nodes):
             [wp.launch(self.nodes.step, len(self.place), nodes, **launch)],
             [wp.launch(tick, 1, [self.clock, 1], **launch)],
         ]
-        if not self.scatter:
-            links = [self.start, self.entry, self.link, self.stress, self.push, self.force]
-            forward.insert(1, [wp.launch(self.nodes.gather, len(self.place), links, **launch)])
-        return _Task(slots, u, v, q, inputs, forward)
+        if self.lumps:
+            forward[1:1] = self._gathered("", [self.stress, self.push], [self.force])
+        return _Task(slots, u, v, q, inputs, March(forward, self.device))
 
     def _back(self, task: "_Task", drive: Drive, springs: bool) -> "_Back":
         """Device arrays and recorded launches of the way back; nothing is stepped by recording them."""
@@ -304,22 +351,39 @@ class Simulator(Nodes):
             [wp.launch(self.nodes.before, len(self.place), before, **launch)],
             self._particles(self.kernels.adjoint, task.inputs, outs),
         ]
-        if not self.scatter:
-            links = [self.start, self.entry, self.link, F, G, x, y, u, v]
-            commands.append([wp.launch(self.nodes.gather_back, len(self.place), links, **launch)])
-        return _Back(u, v, q, theta, path, hold, stiffness, m, rho, commands)
+        if self.lumps:
+            commands += self._gathered("_back", [F, G, x, y], [u, v])
+        return _Back(u, v, q, theta, path, hold, stiffness, m, rho, March(commands, self.device))
+
+    def _gathered(self, way: str, per_particle: list, at_nodes: list) -> list:
+        """Recorded launches that sum over the particles of every node, in two phases."""
+        m, launch = self.lumps, {"device": self.device, "record_cmd": True}
+        sums = [self._zeros(m.shape[0] * m.stride, self.types.Vec) for _ in at_nodes]
+        lump, gather = (getattr(self.nodes, f"{name}{way}") for name in ("lump", "gather"))
+        return [
+            [
+                wp.launch(
+                    lump,
+                    m.shape,
+                    [m.begin, m.link, *per_particle, m.stride, *sums],
+                    **launch,
+                )
+            ],
+            [wp.launch(gather, len(self.place), [m.start, m.entry, *sums, *at_nodes], **launch)],
+        ]
 
     def _particles(self, kernel, inputs: list, outs: list) -> list:
         """One recorded launch for each share of the particles."""
         return [
-            wp.launch(kernel, count, mine + outs, device=self.device, record_cmd=True)
+            wp.launch(kernel, count, mine + outs, device=self.device, record_cmd=True, block_dim=BLOCK)
             for mine, (_, count) in zip(inputs, self.parts, strict=True)
         ]
 
     def _anchors(self, drive: Drive):
         s = self.types
         anchors = s.Anchors()
-        anchors.member, anchors.share = self._put(drive.member, int), self._put(drive.share, s.real)
+        anchors.member = self._put(drive.member[self.order], int)
+        anchors.share = self._put(drive.share[self.order], s.real)
         anchors.path, anchors.hold = self._put(drive.path, s.Vec), self._put(drive.hold, s.real)
         anchors.turning = int(drive.turn is not None)
         turn = np.zeros((1, 1, 3, 3)) if drive.turn is None else drive.turn
@@ -331,7 +395,8 @@ class Simulator(Nodes):
         """Put a state into the first slot; what it does not hold is zero."""
         for k, array in enumerate((task.u, task.v, task.q)):
             if k < len(state) and state[k].size:
-                array[0].assign(np.ascontiguousarray(state[k], self.real))
+                value = state[k][self.order] if array is task.q else state[k]
+                array[0].assign(np.ascontiguousarray(value, self.real))
             else:
                 array[0].zero_()
         self.clock.assign(np.array([0, step], np.int32))
@@ -339,27 +404,41 @@ class Simulator(Nodes):
 
     def _state(self, task: "_Task", slot: int) -> State:
         u, v, q = (array[slot].numpy().copy() for array in (task.u, task.v, task.q))
-        return u, v, q if self.width else np.zeros((self.count, 0), self.real)
+        return u, v, self._by_particle(q) if self.width else np.zeros((self.count, 0), self.real)
 
-    def _check(self, states: list[State], theta: np.ndarray, drive: Drive, frame: int) -> None:
+    def _by_particle(self, sorted_rows: np.ndarray) -> np.ndarray:
+        """Rows in the device's order, in that of `rest`."""
+        rows = np.empty_like(sorted_rows)
+        rows[self.order] = sorted_rows
+        return rows
+
+    def _check(self, before: State, after: State, theta: np.ndarray, drive: Drive, frame: int) -> None:
         """Stop where the last frame went wrong, and say where, when and by which law."""
-        step, particle = min(self.trouble.numpy().tolist())
-        if step == NEVER and np.isfinite(states[-1][0]).all():
+        step, sorted_particle = min(self.trouble.numpy().tolist())
+        if step == NEVER and np.isfinite(after[0]).all():
             return
         if step == NEVER:
             raise Breakdown(
                 f"simulation: a displacement is not finite between frames {frame} and {frame + 1}. Take a smaller step."
             )
+        particle = int(self.order[sorted_particle])
         task = self._task(theta, drive, 2)
-        self._load(task, states[-2], frame * drive.per_frame)
-        march(task.forward, max(0, step - frame * drive.per_frame - 1))
-        law = culprit(self, theta, self._state(task, max(0, step - frame * drive.per_frame - 1) % 2), int(particle))
+        self._load(task, before, frame * drive.per_frame)
+        task.forward.march(max(0, step - frame * drive.per_frame - 1))
+        law = culprit(self, theta, self._state(task, max(0, step - frame * drive.per_frame - 1) % 2), particle)
         where = np.round(self.rest[particle], 4).tolist()
         raise Breakdown(
             f"simulation: particle {particle} at rest position {where} m turned inside out (or stopped being a "
             f"number) at step {step} ({step * drive.step:.4f} s), where {law} pushed hardest. Its load is too violent "
             "for this tissue or the step too large: take a smaller step, a gentler motion, or a stiffer tissue."
         )
+
+
+def _padded(rows: np.ndarray, multiple: int) -> np.ndarray:
+    """Rows (P, K, ...) made longer to a multiple, by their first node with links of weight zero."""
+    more = -rows.shape[1] % multiple
+    filler = rows[:, :1] if rows.ndim == 2 else np.zeros_like(rows[:, :1])
+    return np.concatenate([rows, np.repeat(filler, more, 1)], 1)
 
 
 @dataclass(frozen=True)
@@ -369,7 +448,7 @@ class _Task:
     v: wp.array
     q: wp.array
     inputs: list
-    forward: list
+    forward: March
 
 
 @dataclass(frozen=True)
@@ -383,4 +462,4 @@ class _Back:
     stiffness: wp.array
     mass: wp.array
     rho: wp.array
-    commands: list
+    commands: March
