@@ -101,7 +101,7 @@ class Simulator(Nodes):
         self.rest, self.terms, self.device, self.density = np.asarray(rest, float), tuple(terms), device, float(density)
         self.count, self.volume_p, self.precision = len(rest), np.asarray(volume, float), precision
         super().__init__(grid, self.rest, self.volume_p, cut, balls)
-        self.types = shapes(precision)
+        self.types, self.threads = shapes(precision), threads
         self.real = np.float32 if precision == "single" else np.float64
         local, links = self.links(self.rest)
         # A kink's weights sum to nothing: its inertia is what keeps it as slow as a cell.
