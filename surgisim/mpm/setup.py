@@ -18,7 +18,7 @@ from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import ANCHOR, BASE, SHARP_ANCHOR, Drive, drive
 from surgisim.mpm.kink import Ball
 from surgisim.mpm.simulator import Simulator
-from surgisim.mpm.stable import check_step, largest_step, shear_speed, wave_speed
+from surgisim.mpm.stable import check_speed, check_step, largest_step, shear_speed, wave_speed
 from surgisim.mpm.updated import Updated
 from surgisim.physics.catalogue import Numbers, Term, choose, columns, defaults
 from surgisim.physics.place import Place, rows
@@ -99,6 +99,7 @@ class Prepared:
             stiffness=spring,
             grip=grip,
         )
+        check_speed(path.path, path.step, spacing, fps)
         # Tissue that cannot be squeezed pushes on its base far harder than it shears it.
         path.stiffness[0] *= max(1.0, BASE * pressure**2 / self._held_motion(held) / spring)
         path = replace(path, share=path.share * self._firmer(self.theta(values, held=held)))

@@ -52,10 +52,11 @@ def test_more_runs_than_copies_take_turns():
 def test_one_that_breaks_down_leaves_the_others_whole():
     motion = pulled()
     made = prepare(slab(), tuple(VALUES[0]), density=1050.0)
-    thetas, drives = runs(made, motion, frames=5, pulls=(1.0, 80.0, 0.5))
+    thetas, drives = runs(made, motion, frames=5, pulls=(1.0, 20.0, 0.5))
     first, torn, last = Batch(made, 3).run(thetas, drives)
     assert isinstance(torn, Breakdown)
-    assert np.isfinite(first.u).all() and np.isfinite(last.u).all()
+    assert np.isfinite(first.u).all()
+    assert np.isfinite(last.u).all()
 
 
 def test_runs_at_once_need_one_step():
