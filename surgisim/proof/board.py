@@ -2,11 +2,13 @@
 
 import itertools
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from surgisim.problem import Problem
 from surgisim.proof.calibration import calibration, of_candidates, of_names
 from surgisim.proof.chance import chance
+from surgisim.proof.metadata import features, tells
 from surgisim.proof.naming import NOT_NAMED, common
 from surgisim.proof.shares import median, share
 
@@ -44,8 +46,21 @@ def scoreboard(cases: list[Case]) -> dict[str, Any]:
         "detection": detection(cases),
         "held_out": [_held_out(c) for c in cases if c["held_out"]],
         "chance": chance(cases),
+        "metadata": {},
+        "seals": 0,
+        "pages": "",
         "cases": cases,
     }
+
+
+def with_metadata(cases: list[Case], folders: list[Path]) -> dict[str, Any]:
+    """The board, with how well the law could be told from the recordings' sizes and counts alone."""
+    board = scoreboard(cases)
+    labels = [_row(c) for c in cases]
+    found = {"law": tells(rows := [features(f) for f in folders], labels)} if len(cases) > 1 else {}
+    if len(cases) > 1:
+        found["anything"] = tells(rows, ["nothing" if label == "nothing" else "something" for label in labels])
+    return board | {"metadata": found}
 
 
 def strong(cases: list[Case]) -> list[Case]:

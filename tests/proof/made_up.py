@@ -121,6 +121,9 @@ def named(term: str = "stiff_inclusion", probability: float = 0.9, **changed) ->
     return told | changed
 
 
+RANKED = (("stiff_inclusion", 41.0, 0.9, 1.0), ("tether", 38.2, 0.06, 0.83), ("fibre", 31.0, 0.01, 0.4))
+
+
 def diagnosis(name: str = "r-made", verdict: str = "named", effects: tuple | None = None, **changed) -> dict:
     effects = ((named(),) if verdict in ("named", "equivalence class") else ()) if effects is None else effects
     told = {
@@ -136,7 +139,7 @@ def diagnosis(name: str = "r-made", verdict: str = "named", effects: tuple | Non
         "words": "The tissue gives way less over one place. A stiff lump there removes 84 % of the held-out error.",
         "ranking": [
             {"term": t, "place": PLACE, "log_evidence": e, "probability": p, "cos": c, "held_out_rms": 5e-4}
-            for t, e, p, c in (("stiff_inclusion", 41.0, 0.9, 1.0), ("tether", 38.2, 0.06, 0.83), ("fibre", 31.0, 0.01, 0.4))
+            for t, e, p, c in RANKED
         ],
     }  # fmt: skip
     return told | changed
@@ -152,8 +155,16 @@ def mismatch(made: Recording, extra: float, left: float = 0.1) -> bytes:
     phase = np.array(["rest"] * 4 + ["load"] * 4 + ["hold"] * 7 + ["released"] * 12 + ["load"] * 3 + ["hold"] * 5
                      + ["released"] * 5)  # fmt: skip
     z = np.linalg.norm(before, axis=-1) / 3e-4
-    return npz(points=made.attached(), residual_before=before, residual_after=after, z=np.where(made.visible, z, np.nan),
-               particles=particles, cause=cause, cause_time=way().sum(0), phase=phase)  # fmt: skip
+    return npz(
+        points=made.attached(),
+        residual_before=before,
+        residual_after=after,
+        z=np.where(made.visible, z, np.nan),
+        particles=particles,
+        cause=cause,
+        cause_time=way().sum(0),
+        phase=phase,
+    )
 
 
 def case(
