@@ -27,9 +27,10 @@ class Mismatch:
     cause_time: np.ndarray
     """The same of each frame, (T,)."""
     phase: np.ndarray
-    """What goes on in each frame, (T,) words."""
+    """What goes on in each frame, (T,) words of PHASES."""
 
 
+PHASES = ("rest", "load", "hold", "released")
 FIELDS = ("points", "residual_before", "residual_after", "z", "particles", "cause", "cause_time", "phase")
 
 
@@ -56,4 +57,15 @@ def read_mismatch(path: Path) -> Mismatch:
     for name, shape in shapes.items():
         if arrays[name].shape != shape:
             raise Problem(f"{path}: '{name}' is {arrays[name].shape}, but {shape} is wanted. Diagnose anew.")
-    return Mismatch(**arrays)
+    return Mismatch(**(arrays | {"phase": _words(arrays["phase"], path)}))
+
+
+def _words(phase: np.ndarray, path: Path) -> np.ndarray:
+    """Words or numbers of PHASES as words."""
+    if phase.dtype.kind in "iu":
+        phase = np.array(PHASES)[phase]
+    phase = np.where(phase == "release", "released", phase)
+    strange = sorted(set(phase.tolist()) - set(PHASES))
+    if strange:
+        raise Problem(f"{path}: 'phase' holds {strange}, and {list(PHASES)} are known. Diagnose anew.")
+    return phase

@@ -1,7 +1,7 @@
 """What the named law gains on the manipulation that was never fitted, beside the most that could be gained.
 
-All errors are RMS lengths over the visible points of the frames held out, after each point's mean over them is taken
-off, because a point's reference offset is the tracker's and not the tissue's. In mm.
+All errors are RMS lengths over the visible points that the diagnosis used, in the frames held out, after each point's
+mean over them is taken off, because a point's reference offset is the tracker's and not the tissue's. In mm.
 
     oracle        recorded minus the phantom's own noise-free path with the effects: law, numbers and solver all true
     oracle_before the same without the effects
@@ -15,6 +15,7 @@ import numpy as np
 
 from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.verdict import Verdict
+from surgisim.problem import Problem
 from surgisim.proof.truth import Truth
 from surgisim.recordings.recording import Recording
 
@@ -34,9 +35,9 @@ def held_out(truth: Truth, recording: Recording, verdict: Verdict, mismatch: Mis
     frames = slice(*span)
     if span[0] >= span[1]:
         return None
-    points = recording.points.astype(float)
-    floor = rms((points - truth.true)[:, frames])
-    result = {"oracle": floor, "noise_floor": floor, "oracle_before": rms((points - truth.plain)[:, frames])}
+    points, used = recording.points.astype(float), _used(recording, mismatch)
+    floor = rms((points - truth.true)[used, frames])
+    result = {"oracle": floor, "noise_floor": floor, "oracle_before": rms((points - truth.plain)[used, frames])}
     told = verdict.held_out
     if mismatch is None:
         result |= {"before": told.get("before"), "after": told.get("after"), "source": "stated"}
@@ -54,3 +55,17 @@ def held_out(truth: Truth, recording: Recording, verdict: Verdict, mismatch: Mis
     # Both as stated, so that they are measured the same way.
     result["placebo_better"] = None if placebo is None or said is None else bool(placebo < said)
     return result
+
+
+def _used(recording: Recording, mismatch: Mismatch | None) -> np.ndarray:
+    """Which of the recording's points the diagnosis used, in its order; all where that is not known."""
+    rest = recording.attached()
+    if mismatch is None:
+        return np.arange(len(rest))
+    away = np.linalg.norm(mismatch.points[:, None] - rest[None], axis=-1)
+    if away.min(1).max() > 1e-5:
+        raise Problem(
+            f"mismatch.npz has a point {1e3 * away.min(1).max():.2g} mm from any of recording {recording.name}. "
+            "Score files of one case."
+        )
+    return away.argmin(1)
