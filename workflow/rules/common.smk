@@ -14,6 +14,7 @@ from surgisim.config.whole import PARENTS
 from surgisim.digest import digest
 from surgisim.plan import plan
 from surgisim.problem import Problem
+from surgisim.proof.known.catalogue import catalogue as known_recordings
 from surgisim.proof.shuffle import partner
 
 # What the rules for concealed recordings read of the config, beside the clips' choices.
@@ -132,6 +133,8 @@ ABLATIONS = {
     "no_nulls": {"nulls": 0},
     "no_cause": {"cause": False},
 }
+# Real recordings with a known cause (known.smk).
+KNOWN = known_recordings()
 WAYS = {"main": {}, "shuffled": {}, **ABLATIONS}
 
 

@@ -6,7 +6,6 @@ The base may be elastic only. Take a is diagnosed; with the laws it names, frequ
 from pathlib import Path
 
 from surgisim.proof.known.catalogue import Answer, Found, Known, named
-from surgisim.proof.known.clamped_beam import carried, simulated, swings
 
 FREQUENCY = 7.6
 """First guess [Hz]."""
@@ -14,10 +13,14 @@ DAMPS = ("newtonian", "relaxation", "relaxation_slow", "drag", "paper_viscous")
 
 
 def convert(folder: Path):
+    from surgisim.proof.rigs.clamped_beam import carried
+
     return carried(folder / "beam_gravity_V2_a.c3d")
 
 
 def ask(folder: Path, found: Found) -> list[Answer]:
+    from surgisim.proof.rigs.clamped_beam import simulated, swings
+
     answers = [named(found.verdict, DAMPS, "damping, by any law that loses energy")]
     if not set(found.verdict.names) & set(DAMPS):
         return answers

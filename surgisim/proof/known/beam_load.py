@@ -7,16 +7,17 @@ from pathlib import Path
 
 from surgisim.artifacts.verdict import Effect
 from surgisim.proof.known.catalogue import Answer, Found, Known, named
-from surgisim.proof.known.clamped_beam import LENGTH, carried
 
 LOADS = ("added_mass", "hidden_contact")
-MASS, GRAVITY = 0.052, 9.807
-"""[kg], [m/s^2]"""
+LENGTH, MASS, GRAVITY = 0.1, 0.052, 9.807
+"""Of the beam, whose free end is at z = 0 [m]; [kg], [m/s^2]."""
 NEAR, OFF = 0.15, 0.25
 """Of the length, and of the mass."""
 
 
 def convert(folder: Path):
+    from surgisim.proof.rigs.clamped_beam import carried
+
     return carried(folder / "beam_load52_V2_a.c3d")
 
 

@@ -18,8 +18,6 @@ from surgisim.verification.silicone_beam import above_rest, read
 from surgisim.verification.silicone_run import END
 from surgisim.verification.silicone_take import FPS, PLACES, SIGMA, take, tip
 
-LENGTH = 0.1
-"""Of the beam [m]; its free end is at z = 0."""
 POINTS = 1e-3 * np.array([[3, 3, 1], [27, 3, 1], [3, 27, 1], [27, 27, 1], [15, 15, 1], [15, 15, 9]])
 """Points of the end that are tracked [m]."""
 FITTED, WHOLE = 1.6, 2.4
@@ -33,7 +31,8 @@ def carried(path: Path) -> Recording:
     frames = min(round(WHOLE * FPS), markers.shape[1])
     rest = markers[:, 0].mean(0)
     points = np.empty((len(POINTS), frames, 3))
-    # Where the first frame's markers say that these points are; the makers' places are off by up to a millimetre.
+    # Where the first frame's markers say that these points are: the makers' places are off by up to a millimetre. Only
+    # displacements are taken from there, so that their directions stay those of the beam's axes.
     first, _ = Rotation.align_vectors(PLACES[:3] - PLACES[:3].mean(0), markers[:, 0] - rest)
     own = first.inv().apply(POINTS - PLACES[:3].mean(0)) + rest
     for t in range(frames):
@@ -41,7 +40,7 @@ def carried(path: Path) -> Recording:
         turn, _ = Rotation.align_vectors(markers[:, t] - middle, markers[:, 0] - rest)
         points[:, t] = POINTS + turn.apply(own - rest) + middle - own
     return Recording(
-        name=seen.name,
+        name="take",
         fps=seen.fps,
         mesh=seen.mesh,
         boxes=seen.boxes,
