@@ -44,8 +44,8 @@ def test_the_beams_end_moves_with_its_markers(shared):
         assert np.abs(moved[:, 0]).max() < 1e-8
         assert -moved[:, -1, 0].mean() == pytest.approx(drop, rel=0.03)
         apart = np.linalg.norm(recording.points[0] - recording.points[3], axis=-1)
-        # Rigid, but for the makers' places of the markers, which are off by up to a millimetre.
-        assert np.ptp(apart) < 0.01 * apart[0]
+        # Rigid, but for the makers' places of the markers: up to 2 mm off, turned by up to 0.3.
+        assert np.ptp(apart) < 0.02 * apart[0]
 
 
 def test_a_load_is_asked_for_its_place_and_mass(tmp_path):

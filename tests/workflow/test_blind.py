@@ -1,11 +1,16 @@
 """Concealed recordings: the order in which answers are fixed, diagnoses made, and truths opened."""
 
+import json
 import re
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from cheap_tree import Tree
 
+ROOT = Path(__file__).parents[2]
 JOB = re.compile(r"^(?:local)?rule (\w+):\n(?:    input: (.*)\n)?(?:    output: (.*)\n)?", re.M)
 
 
@@ -71,3 +76,40 @@ def test_shuffled_paths_are_another_cases(jobs):
 def test_a_mistake_in_what_is_invented_is_one_sentence(tree):
     tree.choices = {"cases": 1, "seed": 5, "invent": {"pionts": 3}}
     assert "there is no key 'pionts'; did you mean 'points'?" in tree.says("--dry-run", "blind")
+
+
+@pytest.mark.slow
+def test_a_run_is_invented_sealed_diagnosed_opened_and_scored(tmp_path):
+    for name in ("surgisim", "stages", "workflow", "config", "envs"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(Path(__file__).with_name("stand_in.py"), tmp_path / "stages" / "diagnosis.py")
+    tree, out = Tree(tmp_path, tmp_path / "out"), tmp_path / "out" / "blind" / "4"
+    few = {
+        "points": 30,
+        "spacing": 0.0055,
+        "spacing_coarse": 0.0065,
+        "only": ["fibre"],
+        "snr_low": 1.0,
+        "snr_high": 2.0,
+    }
+    tree.choices = {"cases": 1, "seed": 4, "invent": few}
+    assert tree.run("--keep-going", "blind") == 0
+    board = json.loads((out / "main" / "scoreboard.json").read_text())
+    assert (board["count"], board["seals"], board["seeds"]) == (1, 1, [4])
+    assert board["cases"][0]["verdict"] == "named"
+    files = [out / name for name in ("0/sealed/truth.json", "seals.txt", "0/main/diagnosis.json", "0/main/score.json")]
+    assert sorted(files, key=lambda path: path.stat().st_mtime_ns) == files
+    assert (out / "main" / "../0/main/diagnosis.html").resolve().is_file()
+    assert not tree.plan("blind") - {("blind",)}
+    # One more case: what was diagnosed stays.
+    tree.choices = {**tree.choices, "cases": 2}
+    again = {job for job in tree.plan("blind") if job[0] in ("diagnosis", "invent")}
+    assert again == {("invent", "4", "1"), ("diagnosis", "4", "1", "main")}
+    # Somebody changes the answer afterwards.
+    tree.choices = {**tree.choices, "cases": 1}
+    answer = out / "0" / "sealed" / "truth.json"
+    answer.write_text(answer.read_text().replace('"noise": 0.0003', '"noise": 0.0001'))
+    assert tree.run("--keep-going", "blind") != 0
+    said = (tree.out / "logs" / "blind" / "4" / "0" / "main" / "score.log").read_text()
+    assert "does not have the seal that was published before the diagnosis" in said
+    assert not (out / "0" / "main" / "score.json").exists()
