@@ -12,12 +12,14 @@ from proof.made_up import diagnosis, effect, named
 from proof.test_score import scored
 
 from surgisim.problem import Problem
+from surgisim.proof.ablations import losses
 from surgisim.proof.board import scoreboard, with_metadata
 from surgisim.proof.calibration import calibration
 from surgisim.proof.chance import chance
 from surgisim.proof.metadata import features, tells
 from surgisim.proof.shares import share, wilson
 from surgisim.proof.shuffle import partner, shuffled
+from surgisim.report.board.ablations import page as ablations_page
 from surgisim.report.board.page import page, table
 
 LAWS = ("stiff_inclusion", "tether", "fibre", "relaxation")
@@ -154,3 +156,15 @@ def test_the_page_needs_nothing_beside_itself_and_the_table_has_every_case(run):
     rows = list(csv.DictReader(io.StringIO(table(board).decode())))
     assert [r["recording"] for r in rows] == [c["recording"] for c in board["cases"]]
     assert json.loads(json.dumps(board, allow_nan=False))["count"] == 8
+
+
+def test_what_a_part_is_worth_is_what_is_lost_without_it(run):
+    cases = run[1]
+    worse = [c | {"top1": False} if c["top1"] and c["case"] in (1, 2) else c for c in cases]
+    found = losses({"main": scoreboard(cases), "iid": scoreboard(worse)})
+    assert found["changes"]["iid"] == {"lost": 2, "gained": 0, "count": 8, "p": 0.5}
+    assert found["changes"]["main"]["p"] == 1.0
+    text = ablations_page(found).decode()
+    assert "residuals taken as independent" in text
+    with pytest.raises(Problem, match="not scored on the same cases"):
+        losses({"main": scoreboard(cases), "iid": scoreboard(worse[1:])})

@@ -138,7 +138,7 @@ def test_a_mistake_in_the_config_is_one_sentence(tree):
 
 
 CONCEALED = {"invent", "seals", "shuffle", "diagnosis", "diagnosis_report", "score", "scoreboard"}
-CONCEALED |= {"known", "known_direct", "known_score", "known_board"}
+CONCEALED |= {"known", "known_direct", "known_score", "known_board", "ablations"}
 AGAIN = {"verification", "verification_case", "known_diagnosis", "known_report"}
 """Rules that run the module of another's name."""
 ASKED_FOR = {"blind", "blind_shuffled", "blind_ablations", "blind_real"}

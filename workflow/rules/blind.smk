@@ -221,8 +221,31 @@ rule blind_shuffled:
         f"blind/{SEED}/shuffled/scoreboard.html",
 
 
+rule ablations:
+    input:
+        board=lambda w: expand(
+            "blind/{seed}/{way}/scoreboard.json", seed=w.seed, way=["main", *ABLATIONS]
+        ),
+    output:
+        table="blind/{seed}/ablations.json",
+        page="blind/{seed}/ablations.html",
+    log:
+        "logs/blind/{seed}/ablations.log",
+    benchmark:
+        "benchmarks/blind/{seed}/ablations.tsv"
+    conda:
+        "../../envs/report.yaml"
+    resources:
+        mem_mb=1000,
+    params:
+        settings=json.dumps({"ways": ["main", *ABLATIONS]}),
+        code=code("ablations"),
+    shell:
+        'python "$SURGISIM/stages/ablations.py" --board {input.board}'
+        " --table {output.table} --page {output.page}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
 rule blind_ablations:
     input:
-        expand(
-            "blind/{seed}/{way}/scoreboard.html", seed=SEED, way=["main", *ABLATIONS]
-        ),
+        f"blind/{SEED}/ablations.html",
