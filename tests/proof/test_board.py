@@ -15,9 +15,11 @@ from surgisim.problem import Problem
 from surgisim.proof.ablations import losses
 from surgisim.proof.board import scoreboard, with_metadata
 from surgisim.proof.calibration import calibration
+from surgisim.proof.case import phases
 from surgisim.proof.chance import chance
 from surgisim.proof.metadata import features, tells
 from surgisim.proof.shares import share, wilson
+from surgisim.proof.shorten import shortened
 from surgisim.proof.shuffle import partner, shuffled
 from surgisim.report.board.ablations import page as ablations_page
 from surgisim.report.board.page import page, table
@@ -144,6 +146,14 @@ def test_shuffled_paths_belong_to_another_body():
         np.nanmax(np.linalg.norm(other.points - other.attached()[:, None], axis=-1)), rel=1e-3
     )
     assert (mixed.visible == other.visible).all()
+
+
+def test_a_shorter_clip_lacks_what_comes_later():
+    whole = made_up.recording()
+    assert phases(whole) == ["rest", "load", "hold", "release"]
+    assert phases(shortened(whole, "hold")) == ["rest", "load", "hold"]
+    assert phases(shortened(whole, "load")) == ["rest", "load"]
+    assert shortened(whole, "load").split["held_out"] == whole.split["held_out"]
 
 
 def test_the_page_needs_nothing_beside_itself_and_the_table_has_every_case(run):

@@ -137,11 +137,11 @@ def test_a_mistake_in_the_config_is_one_sentence(tree):
     assert "there is no key 'reconstruction.iteratons'; did you mean 'iterations'?" in tree.says("--dry-run")
 
 
-CONCEALED = {"invent", "seals", "shuffle", "diagnosis", "diagnosis_report", "score", "scoreboard"}
+CONCEALED = {"invent", "seals", "shuffle", "shorten", "diagnosis", "diagnosis_report", "score", "scoreboard"}
 CONCEALED |= {"known", "known_direct", "known_score", "known_board", "ablations"}
 AGAIN = {"verification", "verification_case", "known_diagnosis", "known_report"}
 """Rules that run the module of another's name."""
-ASKED_FOR = {"blind", "blind_shuffled", "blind_ablations", "blind_real"}
+ASKED_FOR = {"blind", "blind_shuffled", "blind_ablations", "blind_phases", "blind_real"}
 """Rules without a stage of their own: what `snakemake NAME` makes."""
 
 

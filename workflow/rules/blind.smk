@@ -8,6 +8,8 @@ wildcard_constraints:
     seed=r"\d+",
     case=r"\d+",
     way="|".join(WAYS),
+    shorter="|".join(SHORTER),
+    side=r"ablations|phases",
 
 
 rule invent:
@@ -88,6 +90,35 @@ rule shuffle:
         'python "$SURGISIM/stages/shuffle.py" --recording {params.own} --other {params.other}'
         " --shuffled {output.recording} --rest {output.rest} --fixed {output.fixed} --grip {output.grip}"
         " --tracks {output.tracks} --split {output.split} --code {params.code} > {log} 2>&1"
+
+
+rule shorten:
+    input:
+        recording=expand("blind/{{seed}}/{{case}}/recording/{name}", name=FILES),
+    output:
+        recording="blind/{seed}/{case}/{shorter}/recording/recording.json",
+        rest="blind/{seed}/{case}/{shorter}/recording/rest.ply",
+        fixed="blind/{seed}/{case}/{shorter}/recording/fixed.json",
+        grip="blind/{seed}/{case}/{shorter}/recording/grip.npz",
+        tracks="blind/{seed}/{case}/{shorter}/recording/tracks.npz",
+        split="blind/{seed}/{case}/{shorter}/recording/split.json",
+    log:
+        "logs/blind/{seed}/{case}/{shorter}/shorten.log",
+    benchmark:
+        "benchmarks/blind/{seed}/{case}/{shorter}/shorten.tsv"
+    conda:
+        "../../envs/physics.yaml"
+    resources:
+        mem_mb=1000,
+    params:
+        recording=folder,
+        settings=lambda w: json.dumps({"end": SHORTER[w.shorter]}),
+        code=code("shorten"),
+    shell:
+        'python "$SURGISIM/stages/shorten.py" --recording {params.recording}'
+        " --shortened {output.recording} --rest {output.rest} --fixed {output.fixed} --grip {output.grip}"
+        " --tracks {output.tracks} --split {output.split}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
 rule diagnosis:
@@ -224,21 +255,21 @@ rule blind_shuffled:
 rule ablations:
     input:
         board=lambda w: expand(
-            "blind/{seed}/{way}/scoreboard.json", seed=w.seed, way=["main", *ABLATIONS]
+            "blind/{seed}/{way}/scoreboard.json", seed=w.seed, way=BESIDE[w.side]
         ),
     output:
-        table="blind/{seed}/ablations.json",
-        page="blind/{seed}/ablations.html",
+        table="blind/{seed}/{side}.json",
+        page="blind/{seed}/{side}.html",
     log:
-        "logs/blind/{seed}/ablations.log",
+        "logs/blind/{seed}/{side}.log",
     benchmark:
-        "benchmarks/blind/{seed}/ablations.tsv"
+        "benchmarks/blind/{seed}/{side}.tsv"
     conda:
         "../../envs/report.yaml"
     resources:
         mem_mb=1000,
     params:
-        settings=json.dumps({"ways": ["main", *ABLATIONS]}),
+        settings=lambda w: json.dumps({"ways": BESIDE[w.side]}),
         code=code("ablations"),
     shell:
         'python "$SURGISIM/stages/ablations.py" --board {input.board}'
@@ -249,3 +280,8 @@ rule ablations:
 rule blind_ablations:
     input:
         f"blind/{SEED}/ablations.html",
+
+
+rule blind_phases:
+    input:
+        f"blind/{SEED}/phases.html",

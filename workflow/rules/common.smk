@@ -125,17 +125,22 @@ FILES = (
     "split.json",
 )
 
-# Ways to diagnose the same cases: the method; the same with one of its parts left out, to see what each is worth; and
-# the method on paths that belong to another case, which must bring naming down to chance.
+# Ways to diagnose the same cases: the method; the same with one of its parts left out, to see what each is worth; the
+# method on clips that end sooner; and on paths that belong to another case, which must bring naming down to chance.
 ABLATIONS = {
     "iid": {"whitened": False},
     "no_offset": {"offset": False},
     "no_nulls": {"nulls": 0},
     "no_cause": {"cause": False},
 }
+SHORTER = {"until_load": "load", "until_hold": "hold"}
+WAYS = {"main": {}, "shuffled": {}, **dict.fromkeys(SHORTER, {}), **ABLATIONS}
+
+# Which are put side by side on one page.
+BESIDE = {"ablations": ["main", *ABLATIONS], "phases": ["main", *SHORTER]}
+
 # Real recordings with a known cause (known.smk).
 KNOWN = known_recordings()
-WAYS = {"main": {}, "shuffled": {}, **ABLATIONS}
 
 
 def inventing(w):
@@ -153,7 +158,8 @@ def inventing(w):
 
 def shown(w):
     """The files of the recording that this way of diagnosing gets to see."""
-    folder = "shuffled/recording" if w.way == "shuffled" else "recording"
+    changed = w.way == "shuffled" or w.way in SHORTER
+    folder = f"{w.way}/recording" if changed else "recording"
     return [f"blind/{w.seed}/{w.case}/{folder}/{name}" for name in FILES]
 
 

@@ -1,4 +1,4 @@
-"""What each part of the method is worth, as one HTML file."""
+"""What each part of the method, and of the clip, is worth, as one HTML file."""
 
 from typing import Any
 
@@ -12,6 +12,8 @@ WORDS = {
     "no_offset": "no reference offset of the points",
     "no_nulls": "no calibration on nulls",
     "no_cause": "no map of the cause",
+    "until_load": "fitted until the load ends",
+    "until_hold": "fitted until the hold ends",
     "shuffled": "another case's paths",
 }
 
