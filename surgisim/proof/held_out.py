@@ -1,7 +1,8 @@
 """What the named law gains on the manipulation that was never fitted, beside the most that could be gained.
 
 All errors are RMS lengths over the visible points that the diagnosis used, in the frames held out, after each point's
-mean over them is taken off, because a point's reference offset is the tracker's and not the tissue's. In mm.
+mean over the rest before the first grasp is taken off, because a point's reference offset is the tracker's and not the
+tissue's. In mm.
 
     oracle        recorded minus the phantom's own noise-free path with the effects: law, numbers and solver all true
     oracle_before the same without the effects
@@ -20,31 +21,42 @@ from surgisim.proof.truth import Truth
 from surgisim.recordings.recording import Recording
 
 
-def rms(residual: np.ndarray) -> float:
-    """RMS length of residuals [m], (K, T, 3), NaN where unseen, each point's own mean taken off [mm]."""
+LEAST = 3
+"""Frames of rest that an offset is told from; where a point is seen in fewer, from all frames that may be fitted."""
+
+
+def rms(residual: np.ndarray, rest: slice, frames: slice) -> float:
+    """RMS length of residuals [m], (K, T, 3), NaN where unseen, in `frames`, each point's mean in `rest` taken off [mm]."""
     seen = np.isfinite(residual).all(-1)
-    kept = seen.sum(1) > 1
-    mean = np.zeros((len(residual), 1, 3))
-    mean[kept, 0] = [r[s].mean(0) for r, s in zip(residual[kept], seen[kept], strict=True)]
-    return 1e3 * float(np.sqrt(((residual - mean)[kept][seen[kept]] ** 2).sum(-1).mean()))
+    known = np.where(seen[..., None], residual, 0.0)
+
+    def mean(span: slice) -> tuple[np.ndarray, np.ndarray]:
+        count = seen[:, span].sum(1)
+        return known[:, span].sum(1) / np.maximum(count, 1)[:, None], count
+
+    (offset, count), (instead, _) = mean(rest), mean(slice(0, frames.start))
+    offset = np.where((count >= LEAST)[:, None], offset, instead)
+    off = (known - offset[:, None])[:, frames][seen[:, frames]]
+    return 1e3 * float(np.sqrt((off**2).sum(-1).mean()))
 
 
 def held_out(truth: Truth, recording: Recording, verdict: Verdict, mismatch: Mismatch | None) -> dict | None:
     """The errors; None where no frame is held out. `before` and `after` are the mismatch's, or else as stated."""
     span = (recording.split or {}).get("held_out", (0, 0))
-    frames = slice(*span)
     if span[0] >= span[1]:
         return None
+    held = recording.motion.active.any(0)
+    parts = slice(0, int(held.argmax()) if held.any() else span[0]), slice(*span)
     points, used = recording.points.astype(float), _used(recording, mismatch)
-    floor = rms((points - truth.true)[used, frames])
-    result = {"oracle": floor, "noise_floor": floor, "oracle_before": rms((points - truth.plain)[used, frames])}
+    floor = rms((points - truth.true)[used], *parts)
+    result = {"oracle": floor, "noise_floor": floor, "oracle_before": rms((points - truth.plain)[used], *parts)}
     told = verdict.held_out
     if mismatch is None:
         result |= {"before": told.get("before"), "after": told.get("after"), "source": "stated"}
     else:
         result |= {
-            "before": rms(mismatch.residual_before[:, frames]),
-            "after": rms(mismatch.residual_after[:, frames]),
+            "before": rms(mismatch.residual_before, *parts),
+            "after": rms(mismatch.residual_after, *parts),
             "source": "mismatch.npz",
         }
     result |= {"placebo": told.get("placebo"), "flexible": told.get("flexible"), "stated": dict(told)}

@@ -130,11 +130,14 @@ def test_the_cut_is_measured_against_the_noise_floor(tmp_path):
     assert errors["before"] == pytest.approx(errors["oracle_before"], rel=1e-4)
 
 
-def test_a_points_constant_offset_is_no_error():
-    away = np.random.default_rng(0).normal(size=(5, 9, 3))
+def test_a_points_constant_offset_is_no_error_but_what_stays_after_a_pull_is():
+    away = np.random.default_rng(0).normal(size=(5, 90, 3))
     away[1, 4] = np.nan
-    shifted = away + np.arange(5)[:, None, None]
-    assert rms(shifted) == pytest.approx(rms(away))
+    parts = slice(0, 30), slice(60, 90)
+    offset, stays = np.arange(5)[:, None, None], 2.0 * (np.arange(90) > 45)[None, :, None]
+    plain = rms(away, *parts)
+    assert rms(away + offset, *parts) == pytest.approx(plain)
+    assert rms(away + stays, *parts) == pytest.approx(np.hypot(plain, 2e3 * 3**0.5), rel=0.05)
 
 
 def test_a_diagnosis_of_fewer_points_is_scored_on_those(tmp_path):
