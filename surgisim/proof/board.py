@@ -73,7 +73,8 @@ def figures(cases: list[Case]) -> dict[str, Any]:
     single = [c for c in cases if c["kind"] == "one"]
     places = [p for c in cases for p in c["places"]]
     errors = [c["held_out"] for c in cases if c["held_out"]]
-    concealing = [h for c, h in ((c, c["held_out"]) for c in cases) if h and c["kind"] in ("one", "two")]
+    # Where the effect is not in the held-out frames (a push that is over), nobody can cut anything there.
+    shown = [c["held_out"] for c in cases if c["held_out"] and c["held_out"]["shows"] and c["kind"] in ("one", "two")]
     rows = [row for c in cases for row in c["parameters"]]
     return {
         "count": len(cases),
@@ -92,7 +93,8 @@ def figures(cases: list[Case]) -> dict[str, Any]:
         "onset_frames": median(abs(o["frames"]) for c in cases for o in c["onsets"]),
         "parameter_error": median(abs(r["relative"]) for r in rows if r["relative"] is not None),
         "parameter_covered": share(r["covered"] for r in rows).told(),
-        "cut": median(h["share"] for h in concealing),
+        "cut": median(h["share"] for h in shown),
+        "cut_effect": median(h["share_effect"] for h in shown),
         "placebo_better": share(h["placebo_better"] for h in errors).told(),
     }
 
@@ -108,7 +110,12 @@ GOALS: tuple[tuple[str, str, Callable[[float], bool], str], ...] = (
         "at least 80 %",
     ),
     ("place_right", "local and named rightly: placed within 1.5 grid cells", lambda v: v >= 0.80, "at least 80 %"),
-    ("cut", "held-out manipulation: cut of what the oracle cuts, median", lambda v: v >= 0.70, "at least 70 %"),
+    (
+        "cut",
+        "held-out manipulation: cut of what the oracle cuts, median, where the effect shows there",
+        lambda v: v >= 0.70,
+        "at least 70 %",
+    ),
     ("placebo_better", "a placebo beats the named law on held-out frames", lambda v: v == 0.0, "never"),
 )
 """Figure, in words, whether a value meets it, and what is asked: issue 4, at ratios of 3 and more, fixed beforehand."""

@@ -8,6 +8,8 @@ tissue's. In mm.
     oracle_before the same without the effects
     noise_floor   the tracking noise; one number with `oracle`, in which nothing but noise is left
     share         (before - after) / (before - oracle): what the diagnosis cuts of what the oracle would
+    share_effect  (before - after) / (oracle_before - oracle): the same over what the effect itself adds
+    shows         whether the effect is there at all: at least as large as the tracking noise in these frames
 
 The oracle is another solver than the one that diagnoses, so that `share` also counts the engine's own error.
 """
@@ -20,13 +22,12 @@ from surgisim.problem import Problem
 from surgisim.proof.truth import Truth
 from surgisim.recordings.recording import Recording
 
-
 LEAST = 3
 """Frames of rest that an offset is told from; where a point is seen in fewer, from all frames that may be fitted."""
 
 
 def rms(residual: np.ndarray, rest: slice, frames: slice) -> float:
-    """RMS length of residuals [m], (K, T, 3), NaN where unseen, in `frames`, each point's mean in `rest` taken off [mm]."""
+    """RMS length of residuals [m], (K, T, 3), NaN where unseen, in `frames`, each point's mean in `rest` off [mm]."""
     seen = np.isfinite(residual).all(-1)
     known = np.where(seen[..., None], residual, 0.0)
 
@@ -63,6 +64,9 @@ def held_out(truth: Truth, recording: Recording, verdict: Verdict, mismatch: Mis
     before, after = result["before"], result["after"]
     gain = None if before is None else before - floor
     result["share"] = (before - after) / gain if gain and gain > 0 and after is not None else None
+    shows = truth.told["snr_held_out"] >= 1
+    effect = result["oracle_before"] - floor
+    result |= {"shows": shows, "share_effect": (before - after) / effect if shows and after is not None else None}
     placebo, said = told.get("placebo"), told.get("after")
     # Both as stated, so that they are measured the same way.
     result["placebo_better"] = None if placebo is None or said is None else bool(placebo < said)
