@@ -112,7 +112,7 @@ GOALS: tuple[tuple[str, str, Callable[[float], bool], str], ...] = (
     ("place_right", "local and named rightly: placed within 1.5 grid cells", lambda v: v >= 0.80, "at least 80 %"),
     (
         "cut",
-        "held-out manipulation: cut of what the oracle cuts, median, where the effect shows there",
+        "held-out manipulation: cut of what the oracle cuts, median",
         lambda v: v >= 0.70,
         "at least 70 %",
     ),
