@@ -84,6 +84,8 @@ def figures(cases: list[Case]) -> dict[str, Any]:
         "two_one_of_them": share(c["top1"] for c in cases if c["kind"] == "two").told(),
         "two_both": share(c["both"] for c in cases).told(),
         "false_discovery": share(c["false_discovery"] for c in cases).told(),
+        "wrong_names": share(wrong for c in cases for wrong in c["wrong_names"]).told(),
+        "class_holds": share(c["class_holds"] for c in cases).told(),
         "alarm": share(c["verdict"] != NOT_NAMED[0] for c in cases if c["kind"] == "nothing").told(),
         "held_back": share(c["held_back"] for c in cases).told(),
         "abstained": share(c["abstained"] for c in cases if c["kind"] != "nothing").told(),

@@ -44,7 +44,8 @@ def naming(kind: str, names: tuple[str, ...], verdict: Verdict) -> dict:
     top1, top2: the concealed law was named first, or first or second (a case with two: one of them was). A verdict
     that names nothing is never right, whatever its ranking. both: the first two names are the two concealed ones.
     false_discovery: something was named where nothing is. held_back: what no catalogue has was called unexplained,
-    or named with a probability below SURE.
+    or named with a probability below SURE. wrong_names: for each name of a verdict whether it is wrong; an equivalence
+    class is one name, wrong where it does not hold the truth. class_holds: such a class does.
     """
     known, given = order(verdict), [common(t) for t in verdict.names]
     speaks = bool(given)
@@ -55,6 +56,8 @@ def naming(kind: str, names: tuple[str, ...], verdict: Verdict) -> dict:
         "named": [{"term": e.term, "probability": e.probability} for e in verdict.effects] if speaks else [],
         "stated": said(verdict),
         "ranked": known,
+        "wrong_names": _wrong(verdict, wanted),
+        "class_holds": bool(wanted & set(given)) if verdict.verdict == "equivalence class" and inside else None,
         "probability": first,
         "probability_of_truth": max((said(verdict).get(n, 0.0) for n in wanted), default=None),
         "abstained": not speaks,
@@ -65,3 +68,10 @@ def naming(kind: str, names: tuple[str, ...], verdict: Verdict) -> dict:
         "false_discovery": speaks if kind == "nothing" else None,
         "held_back": verdict.verdict == "unexplained" or (speaks and first < SURE) if kind == "outside" else None,
     }
+
+
+def _wrong(verdict: Verdict, wanted: set[str]) -> list[bool]:
+    given = [common(t) for t in verdict.names]
+    if verdict.verdict == "equivalence class":
+        return [not wanted & set(given)]
+    return [name not in wanted for name in given]

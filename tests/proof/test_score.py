@@ -121,6 +121,14 @@ def test_of_two_laws_one_is_right_and_both_are_better(tmp_path):
     assert (one["top1"], one["both"], both["both"]) == (True, False, True)
 
 
+def test_a_second_name_that_is_not_concealed_is_a_wrong_name(tmp_path):
+    more = diagnosis(effects=(named(), named("fibre", 0.6)))
+    assert scored(tmp_path / "more", told=more)["wrong_names"] == [False, True]
+    class_ = diagnosis(verdict="equivalence class", effects=(named("tether", 0.5), named("stiff_inclusion", 0.4)))
+    found = scored(tmp_path / "class", told=class_)
+    assert (found["top1"], found["top2"], found["wrong_names"], found["class_holds"]) == (False, True, [False], True)
+
+
 def test_the_cut_is_measured_against_the_noise_floor(tmp_path):
     errors = scored(tmp_path, extra=3e-3, left=0.1)["held_out"]
     assert errors["source"] == "mismatch.npz"
