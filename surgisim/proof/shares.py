@@ -8,6 +8,8 @@ import numpy as np
 
 Z = 1.959964
 """Of a two-sided 95 % interval."""
+FEW = 5
+"""Values below which a bootstrapped interval would say nothing."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +48,12 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
 
 
 def median(values: Iterable[float | None], seed: int = 0) -> dict:
-    """Median of those that are known, with a bootstrap 95 % interval; None where there are none."""
+    """Median of those that are known, with a bootstrap 95 % interval; None where there are none, or too few for one."""
     known = np.array([v for v in values if v is not None], float)
     if not len(known):
         return {"value": None, "low": None, "high": None, "count": 0}
+    if len(known) < FEW:
+        return {"value": float(np.median(known)), "low": None, "high": None, "count": len(known)}
     drawn = np.random.default_rng(seed).choice(known, (2000, len(known)))
     low, high = np.percentile(np.median(drawn, axis=1), [2.5, 97.5])
     return {"value": float(np.median(known)), "low": float(low), "high": float(high), "count": len(known)}

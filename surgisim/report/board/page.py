@@ -33,7 +33,7 @@ def cards(board: Board) -> list[Card]:
         value = "–" if goal["value"] is None else percent(goal["value"])
         counted = f"{goal['hits']} of {goal['count']}" if "hits" in goal else f"{goal['count']} cases"
         asked = f"asked: {goal['asked']}; {counted}"
-        if goal["value"] is not None:
+        if goal["low"] is not None and goal["value"] is not None:
             asked += f", 95 % interval {percent(goal['low'])} to {percent(goal['high'])}"
         rows.append(Card(goal["words"], value, "", asked, "", mark))
     return rows
@@ -54,12 +54,11 @@ def told(figure: dict[str, Any], unit: str = "%") -> str:
     if "hits" in figure:
         low, high = percent(figure["low"]), percent(figure["high"])
         return f"{percent(figure['value'])} ({figure['hits']}/{figure['count']}; {low} to {high})"
-    if unit == "%":
-        return (
-            f"{percent(figure['value'])} ({percent(figure['low'])} to {percent(figure['high'])}; n {figure['count']})"
-        )
-    low, high = shown(figure["low"]), shown(figure["high"])
-    return f"{shown(figure['value'])} {unit} ({low} to {high}; n {figure['count']})"
+    value = percent(figure["value"]) if unit == "%" else f"{shown(figure['value'])} {unit}"
+    if figure["low"] is None:
+        return f"{value} (n {figure['count']})"
+    low, high = ((percent if unit == "%" else shown)(figure[end]) for end in ("low", "high"))
+    return f"{value} ({low} to {high}; n {figure['count']})"
 
 
 COLUMNS = (
