@@ -79,6 +79,16 @@ def test_the_named_law_is_shown_with_its_equation_and_numbers(tmp_path):
         assert words in text, words
 
 
+def test_a_pull_in_words_is_drawn(tmp_path):
+    words = (
+        "Grasp near (30, 30, 20) mm, pull 5 mm up along (0.00, 0.60, 0.80), hold 1.2 s and release: they would differ."
+    )
+    made = made_up.case(tmp_path, told=diagnosis(effects=(named(separating_experiment=words),)))
+    found = read(made / "recording", made / "diagnosis.json", made / "mismatch.npz", made / "physics.json").experiment
+    assert found["center"] == pytest.approx([0.03, 0.03, 0.02])
+    assert found["pull"] == pytest.approx([0.0, 0.003, 0.004])
+
+
 def test_names_do_not_become_markup(tmp_path):
     text = shown(tmp_path, diagnosis(words="<script>alert(1)</script>")).decode()
     assert "<script" not in text

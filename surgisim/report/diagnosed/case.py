@@ -1,6 +1,7 @@
 """What the page shows, together."""
 
 import json
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -56,4 +57,18 @@ def read(recording: Path, diagnosis: Path, mismatch: Path, physics: Path) -> Dia
             f"{recording} is {clip.name} with {clip.frames}. Pass files of one diagnosis."
         )
     told = json.loads(diagnosis.read_text())
-    return Diagnosed(clip, verdict, left, json.loads(physics.read_text()), told.get("experiment") or {})
+    return Diagnosed(clip, verdict, left, json.loads(physics.read_text()), told.get("experiment") or _pull(verdict))
+
+
+PULL = re.compile(r"near \(([-\d., ]+)\) mm, pull ([\d.]+) mm .*?along \(([-\d., ]+)\)")
+"""How a diagnosis words a pull."""
+
+
+def _pull(verdict: Verdict) -> dict[str, Any]:
+    """Where the first separating experiment takes hold and how it pulls, from its words."""
+    for effect in verdict.effects:
+        found = PULL.search(effect.separating_experiment)
+        if found:
+            center, way = (np.array([float(x) for x in found[k].split(",")]) for k in (1, 3))
+            return {"center": 1e-3 * center, "pull": 1e-3 * float(found[2]) * way}
+    return {}

@@ -24,7 +24,11 @@ def law(effect: Effect) -> Law:
     from surgisim.physics.catalogue import catalogue
 
     known = catalogue().get(effect.term)
-    about = known.about if known else f"{effect.term.replace('_', ' ').capitalize()}: not a law of this catalogue."
+    about = (
+        known.about
+        if known
+        else f"{effect.term.replace('_', ' ').capitalize()}, by other laws; physics.json says which."
+    )
     title, equation, words, source = told(about)
     return Law(title, equation, words, source, _rows(effect), _place(effect), _time(effect))
 
