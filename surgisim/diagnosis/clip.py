@@ -14,8 +14,10 @@ CLEAR = 1.3
 """Radii of a grip within which points are left out: nobody's solution is to be believed at the skin of a grip."""
 DENSITY = 1050.0
 """Of tissue, where the recording gives none [kg/m^3]."""
-SHARE = 0.14
+SHARE = 0.165
 """Spacing of the grid over the cube root of the body's volume."""
+MOST = 120
+"""Points that are used at most; neighbours' errors are alike, so more of them tell little more."""
 LEAST_SEEN = 0.3
 """Share of the fitted frames in which a point must be seen."""
 
@@ -119,6 +121,7 @@ def clip_of(recording: Recording, *, share: float = SHARE) -> Clip:
         raise Problem(
             f"recording {recording.name}: {until} frames may be fitted, at least 8 are needed. Mend split.json."
         )
+    kept = kept[_apart(rest[kept], recording.visible[kept, :until].mean(1), MOST)]
     seen = recording.visible[kept].copy()
     moved = recording.points[kept].astype(float) - rest[kept][:, None]
     moved = np.where(seen[..., None], moved, 0.0)
@@ -134,6 +137,18 @@ def fitted_until(recording: Recording) -> int:
     if len(first) > 1 and first[1] > 8:
         return first[1] - 2
     return max(1, round(0.7 * recording.frames))
+
+
+def _apart(rest: np.ndarray, seen: np.ndarray, most: int) -> np.ndarray:
+    """Which points to use, in their order: the best seen first, then always the one farthest from all others."""
+    if len(rest) <= most:
+        return np.arange(len(rest))
+    chosen = [int(seen.argmax())]
+    nearest = np.linalg.norm(rest - rest[chosen[0]], axis=1)
+    while len(chosen) < most:
+        chosen.append(int((nearest * (0.3 + seen)).argmax()))
+        nearest = np.minimum(nearest, np.linalg.norm(rest - rest[chosen[-1]], axis=1))
+    return np.sort(chosen)
 
 
 def _normal(body: Body, rest: np.ndarray) -> np.ndarray:

@@ -83,7 +83,7 @@ class Tangent:
             total[mine] += self.share[mine, s, None] * (force[mine] @ answer.T)
         return total.reshape(len(force), -1, 3).swapaxes(0, 1)
 
-    def anchored(self, anchor: int) -> sparse.csr_matrix:
+    def anchored(self, anchor: int) -> np.ndarray:
         """Forces [N], (3 A, 3), by a shift of an anchor by one metre along each axis."""
         simulator, drive = self.prepared.simulator, self.drive
         member = ((drive.member >> anchor) & 1).astype(float) * drive.share * simulator.volume_p
