@@ -217,7 +217,8 @@ def slipping(clip: Clip, base: Base) -> Iterator[Block]:
         way = [near.over_time(states[:, d], np.ones(until)) * path[None, :, d, None] for d in range(3)]
         full = -sum(way)
         time, length = clip.time[:until], np.linalg.norm(path, axis=1)
-        begin, last = time[active][0], time[active][-1]
+        # A share lost from the start is how firmly the grid carries a grip (nuisance.grips), not a slip.
+        begin, last = time[np.argmax(length > 0.3 * length.max())], time[active][-1]
         columns, found = [], []
         for onset in np.linspace(begin, last - 0.15, 12):
             for tau in (0.05, 0.15, 0.35, 0.7):

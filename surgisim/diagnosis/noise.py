@@ -76,27 +76,40 @@ class Whitener:
     mask: np.ndarray
     """(K, T)"""
 
-    def __call__(self, field: np.ndarray, offsets: bool = True) -> np.ndarray:
+    def __call__(self, field: np.ndarray) -> np.ndarray:
         """Of fields [m], (..., K, T, 3), as (..., K T 3) float64."""
         scaled = field * (self.mask * self.scale[:, None])[..., None]
         mode = np.tensordot(self.axes.T, np.moveaxis(scaled, -3, 0), (1, 0))
         shape = mode.shape
         mode = np.moveaxis(mode, -2, 1).reshape(shape[0], shape[-2], -1)
         white = self.inverse @ mode
-        if offsets:
-            white = white - self.still[:, :, None] * (self.still[:, None] @ white)
+        white = white - self.still[:, :, None] * (self.still[:, None] @ white)
         white = white.reshape(shape[0], shape[-2], *shape[1:-2], shape[-1])
         white = np.moveaxis(np.moveaxis(white, 1, -2), 0, -3)
         return white.reshape(*white.shape[:-3], -1)
 
+    def back(self, white: np.ndarray) -> np.ndarray:
+        """The transpose: of numbers (K T 3,), as (K, T, 3)."""
+        mode = white.reshape(len(self.scale), -1, 3).astype(float)
+        mode = mode - self.still[:, :, None] * (self.still[:, None] @ mode)
+        mode = np.swapaxes(self.inverse, 1, 2) @ mode
+        return np.tensordot(self.axes, mode, (1, 0)) * (self.mask * self.scale[:, None])[..., None]
 
-def whitener(noise: Noise, rest: np.ndarray, seen: np.ndarray) -> Whitener:
-    """For points `rest` [m], (K, 3), seen where `seen`, (K, T)."""
+    def without_constant(self, white: np.ndarray) -> np.ndarray:
+        """Numbers (K T 3, C) less what a constant of each point could be."""
+        parts = white.reshape(*self.still.shape, 3, -1)
+        still = self.still.astype(white.dtype)
+        parts = parts - still[:, :, None, None] * np.einsum("mt,mtic->mic", still, parts)[:, None]
+        return parts.reshape(white.shape)
+
+
+def whitener(noise: Noise, rest: np.ndarray, seen: np.ndarray, offsets: bool = True) -> Whitener:
+    """For points `rest` [m], (K, 3), seen where `seen`, (K, T); `offsets`: whether each has a constant of its own."""
     values, axes = np.linalg.eigh(noise.spatial(rest))
     factor = np.linalg.cholesky(noise.temporal(seen.shape[1], np.maximum(values, 0)))
     inverse = np.linalg.inv(factor)
     still = inverse.sum(-1)
-    still = still / np.linalg.norm(still, axis=1, keepdims=True)
+    still = still / np.linalg.norm(still, axis=1, keepdims=True) * offsets
     return Whitener(1 / noise.level, axes, inverse, still, seen.astype(float))
 
 

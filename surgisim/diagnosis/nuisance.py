@@ -17,7 +17,7 @@ SHARES = (0.080, 0.060, 0.045, 0.030, 0.022, 0.014)
 engine and the phantom's finite elements on bodies without hidden physics (docs/diagnosis.md)."""
 ALIKE = 0.008
 """Distance over which that error is alike [m]."""
-FIRM = 0.05
+FIRM = 0.15
 """Standard deviation of how much more or less than all of its path a grip carries along [1]."""
 MODES = 24
 """Spatial patterns kept of it."""
