@@ -26,9 +26,7 @@ def main(recording, work, *, settings, progress):
     from surgisim.diagnosis.diagnose import diagnose
     from surgisim.recordings.folder import read_recording
 
-    found, physics, mismatch = diagnose(
-        read_recording(recording), settings, progress, memo_for(recording, settings, work)
-    )
+    found, physics, mismatch = diagnose(read_recording(recording), settings, progress, memo_for(recording, settings, work))
     return found, physics, mismatch, cloud(mismatch)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.tangent import base_piola, piola
+from surgisim.mpm.setup import Values
 from surgisim.physics.catalogue import choose
 from surgisim.physics.place import Place
 
@@ -197,12 +198,7 @@ def breathing(clip: Clip, base: Base) -> Block:
     for rate in np.geomspace(max(0.18, 0.7 / last), 0.75, 14):
         up = ease(at / 0.5)
         turn = 2 * np.pi * rate * at
-        waves = [
-            up * np.sin(turn),
-            up * (np.cos(turn) - 1),
-            0.5 * up * np.sin(2 * turn),
-            0.5 * up * (np.cos(2 * turn) - 1),
-        ]
+        waves = [up * np.sin(turn), up * (np.cos(turn) - 1), 0.5 * up * np.sin(2 * turn), 0.5 * up * (np.cos(2 * turn) - 1)]
         mix = np.concatenate([_spread(w) for w in waves], 1)
         found.append(Hypothesis("respiration", mix, 0, None, None, None, {"rate": rate}))
     return Block(columns, found)
@@ -230,9 +226,7 @@ def slipping(clip: Clip, base: Base) -> Iterator[Block]:
                 columns.append(full * ((1 - np.exp(-late)) ** 2)[None, :, None])
                 found.append((onset, {"tau": tau, "grip": j}))
             start = np.interp(onset, time, length)
-            course = np.where(
-                (time > onset) & (length > 0), np.maximum(length - start, 0) / np.maximum(length, 1e-9), 0
-            )
+            course = np.where((time > onset) & (length > 0), np.maximum(length - start, 0) / np.maximum(length, 1e-9), 0)
             if course.max() > 0.05:
                 columns.append(full * course[None, :, None])
                 found.append((onset, {"tau": 0.0, "grip": j}))
@@ -264,7 +258,9 @@ def lumps(clip: Clip, base: Base, centers: np.ndarray, extent: float | None = No
         columns.append(near.over_time(near.at_states(loads[:, None])[:, 0]))
         found.append((term, place))
     eye = np.eye(len(columns))
-    return Block(np.stack(columns), [Hypothesis(t, eye[:, k : k + 1], 0, p) for k, (t, p) in enumerate(found)])
+    return Block(
+        np.stack(columns), [Hypothesis(t, eye[:, k : k + 1], 0, p) for k, (t, p) in enumerate(found)]
+    )
 
 
 def _by_states(base: Base, stress: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
@@ -332,9 +328,7 @@ def remembering(clip: Clip, base: Base) -> Block:
         before = F
     columns = np.stack([near.history(load) for load in loads])
     eye = np.eye(len(forms))
-    return Block(
-        columns, [Hypothesis(n, eye[:, k : k + 1], 1, None, None, None, row) for k, (n, row) in enumerate(forms)]
-    )
+    return Block(columns, [Hypothesis(n, eye[:, k : k + 1], 1, None, None, None, row) for k, (n, row) in enumerate(forms)])
 
 
 def contracting(clip: Clip, base: Base, angles: int = 6) -> Iterator[Block]:
@@ -363,8 +357,7 @@ def contracting(clip: Clip, base: Base, angles: int = 6) -> Iterator[Block]:
                     found.append(about)
         eye = np.eye(len(columns))
         yield Block(
-            np.stack(columns),
-            [Hypothesis("active_contraction", eye[:, n : n + 1], 1, None, 0.0, None, b) for n, b in enumerate(found)],
+            np.stack(columns), [Hypothesis("active_contraction", eye[:, n : n + 1], 1, None, 0.0, None, b) for n, b in enumerate(found)]
         )
 
 

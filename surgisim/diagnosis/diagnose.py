@@ -93,19 +93,11 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     for frame in np.flatnonzero((phase == PHASES.index("release")) & (np.roll(phase, 1) != phase)):
         still[frame : frame + SETTLES] = False
     fitted = slice(0, until)
-    noise = estimate(
-        clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, still[fitted], clip.recording.sigma[clip.kept]
-    )
+    noise = estimate(clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, still[fitted], clip.recording.sigma[clip.kept])
     if settings.noise == "independent":
-        noise = replace(
-            noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0
-        )
+        noise = replace(noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0)
     whiten = whitener(noise, clip.rest, clip.seen[:, fitted], settings.offsets)
-    wrong = (
-        whiten(nuisance.simulator(clip, until, settings.model_error)).T
-        if settings.model_error
-        else np.zeros((3 * until * len(clip.kept), 1))
-    )
+    wrong = whiten(nuisance.simulator(clip, until, settings.model_error)).T if settings.model_error else np.zeros((3 * until * len(clip.kept), 1))
     base = fit_base(clip, whiten, wrong, memo, say=lambda text: progress(0.1, 1, text))
     parts = [wrong, whiten(nuisance.camera(clip, base.simulated[:, fitted])).T, whiten(base.slopes).T]
     if settings.model_error and len(clip.motion.radius):
@@ -178,3 +170,5 @@ def another(case: Case, first: Refit, progress: Progress) -> tuple[Refit, float]
     if laws[best][0] < threshold(laws, case.settings):
         return None
     return refit(left, laws[best][2][0], laws[best][0], z), laws[best][0]
+
+

@@ -171,12 +171,7 @@ def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Cl
                 low, high = value * (1 - share), value * (1 + share)
             elif key == "s":
                 low, high = value ** (1 - share), value ** (1 + share)
-            result[key] = {
-                "value": float(value),
-                "low": float(min(low, high)),
-                "high": float(max(low, high)),
-                "unit": params[key].unit,
-            }
+            result[key] = {"value": float(value), "low": float(min(low, high)), "high": float(max(low, high)), "unit": params[key].unit}
     if h.term == "tool_slip":
         a = float(amplitude[0])
         result["slip"] = {"value": a, "low": a * (1 - share), "high": a * (1 + share), "unit": "1"}
