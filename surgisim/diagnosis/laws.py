@@ -84,7 +84,7 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
         theta = prepared.theta(values, law.places)
         rows = prepared.stiffest(theta)
         per_frame = max(prepared.per_frame_of(rows, clip.fps, SAFETY), base.drive.per_frame)
-        drive = prepared.drive(motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames)
+        drive = prepared.drive(motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames, places=law.places)
         first = int(law.begins * clip.fps)
         begin = None if first == 0 else base.run.state(first)[:2]
         run = prepared.simulator.run(theta, drive, begin=begin, first=first, last=frames - 1)

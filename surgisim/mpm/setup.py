@@ -74,8 +74,9 @@ class Prepared:
         frames: int | None = None,
         held: np.ndarray | None = None,
         grip: float = 1.0,
+        places: Mapping[str, Place] | None = None,
     ) -> Drive:
-        """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values`.
+        """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values` at `places`.
 
         A grip smaller than a cell is widened to one: the grid cannot carry a smaller ball along, and would let
         the tissue slip out of it.
@@ -102,7 +103,7 @@ class Prepared:
         check_speed(path.path, path.step, spacing, fps)
         # Tissue that cannot be squeezed pushes on its base far harder than it shears it.
         path.stiffness[0] *= max(1.0, BASE * pressure**2 / self._held_motion(held) / spring)
-        path = replace(path, share=path.share * self._firmer(self.theta(values, held=held)))
+        path = replace(path, share=path.share * self._firmer(self.theta(values, places, held)))
         for name, term in laws.items():
             if term.drive is not None:
                 path = term.drive(path, **values[name])

@@ -21,7 +21,7 @@ class Anything(Settings):
 
 @stage(
     reads={"recording": Source("a recording folder"), "base": Source("physics.json of the base", required=False)},
-    writes={"diagnosis": Bytes(".json"), "physics": Bytes(".json"), "mismatch": Bytes(".npz")},
+    writes={"diagnosis": Bytes(".json"), "physics": Bytes(".json"), "mismatch": Bytes(".npz"), "cloud": Bytes(".ply")},
     settings=Anything,
 )
 def main(recording, base, *, settings, progress):
@@ -54,7 +54,7 @@ def main(recording, base, *, settings, progress):
     stream = io.BytesIO()
     np.savez(stream, **arrays)
     physics = {"terms": {}, "grid": {"spacing": 0.004, "step": 1e-4}}
-    return json.dumps(told).encode(), json.dumps(physics).encode(), stream.getvalue()
+    return json.dumps(told).encode(), json.dumps(physics).encode(), stream.getvalue(), b"ply\n"
 
 
 if __name__ == "__main__":
