@@ -7,14 +7,17 @@ tangent's states.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.hypothesis import RISE, Hypothesis, ease
+from surgisim.diagnosis.laws import law_of, respond
+from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.tangent import base_piola, piola
-from surgisim.mpm.setup import Values
+from surgisim.mpm.simulator import Breakdown
 from surgisim.physics.catalogue import choose
 from surgisim.physics.place import Place
 
@@ -26,31 +29,17 @@ BLOB = 0.0032
 """Extent of a push or a band that is tried, likewise [m]."""
 LUMP = 0.0040
 """Extent of a lump, likewise [m]."""
-RISE = 0.12
-"""How long a load takes to come or leave [s]."""
 TAUS = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 YIELDS = (0.05, 0.08, 0.12, 0.17, 0.24)
 TEARS = (0.05, 0.08, 0.12, 0.17, 0.24)
 ANGLES = 12
+CAPS = (0.15, 0.35, 0.6)
+"""Friction that a base is tried with, over the largest traction it bears."""
 PERIODS = (0.8, 1.0, 1.25, 1.6, 2.0)
 WAVES = (0.024, 0.045)
 SMALL = 1e-3
 STEPS = 2
 """Steps between two frames in which a memory advances."""
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    term: str
-    mix: np.ndarray
-    """From amplitudes to the block's columns, (C, H)."""
-    sign: int = 0
-    """1 where an amplitude below zero is no tissue's; 0 where both are possible."""
-    place: Place | None = None
-    onset: float | None = None
-    end: float | None = None
-    about: dict = field(default_factory=dict)
-    """The other numbers of the form."""
 
 
 @dataclass(frozen=True)
@@ -104,11 +93,6 @@ def _plane(clip: Clip) -> np.ndarray:
     u = np.cross(clip.normal, [0.0, 0.0, 1.0] if abs(clip.normal[2]) < 0.9 else [0.0, 1.0, 0.0])
     u = u / np.linalg.norm(u)
     return np.stack([u, np.cross(clip.normal, u)])
-
-
-def ease(s: np.ndarray) -> np.ndarray:
-    s = np.clip(s, 0, 1)
-    return s**3 * (10 - 15 * s + 6 * s * s)
 
 
 def pushes(clip: Clip, base: Base, center: np.ndarray, extent: float | None = None) -> Block:
@@ -198,7 +182,12 @@ def breathing(clip: Clip, base: Base) -> Block:
     for rate in np.geomspace(max(0.18, 0.7 / last), 0.75, 14):
         up = ease(at / 0.5)
         turn = 2 * np.pi * rate * at
-        waves = [up * np.sin(turn), up * (np.cos(turn) - 1), 0.5 * up * np.sin(2 * turn), 0.5 * up * (np.cos(2 * turn) - 1)]
+        waves = [
+            up * np.sin(turn),
+            up * (np.cos(turn) - 1),
+            0.5 * up * np.sin(2 * turn),
+            0.5 * up * (np.cos(2 * turn) - 1),
+        ]
         mix = np.concatenate([_spread(w) for w in waves], 1)
         found.append(Hypothesis("respiration", mix, 0, None, None, None, {"rate": rate}))
     return Block(columns, found)
@@ -226,7 +215,9 @@ def slipping(clip: Clip, base: Base) -> Iterator[Block]:
                 columns.append(full * ((1 - np.exp(-late)) ** 2)[None, :, None])
                 found.append((onset, {"tau": tau, "grip": j}))
             start = np.interp(onset, time, length)
-            course = np.where((time > onset) & (length > 0), np.maximum(length - start, 0) / np.maximum(length, 1e-9), 0)
+            course = np.where(
+                (time > onset) & (length > 0), np.maximum(length - start, 0) / np.maximum(length, 1e-9), 0
+            )
             if course.max() > 0.05:
                 columns.append(full * course[None, :, None])
                 found.append((onset, {"tau": 0.0, "grip": j}))
@@ -258,9 +249,7 @@ def lumps(clip: Clip, base: Base, centers: np.ndarray, extent: float | None = No
         columns.append(near.over_time(near.at_states(loads[:, None])[:, 0]))
         found.append((term, place))
     eye = np.eye(len(columns))
-    return Block(
-        np.stack(columns), [Hypothesis(t, eye[:, k : k + 1], 0, p) for k, (t, p) in enumerate(found)]
-    )
+    return Block(np.stack(columns), [Hypothesis(t, eye[:, k : k + 1], 0, p) for k, (t, p) in enumerate(found)])
 
 
 def _by_states(base: Base, stress: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
@@ -328,7 +317,9 @@ def remembering(clip: Clip, base: Base) -> Block:
         before = F
     columns = np.stack([near.history(load) for load in loads])
     eye = np.eye(len(forms))
-    return Block(columns, [Hypothesis(n, eye[:, k : k + 1], 1, None, None, None, row) for k, (n, row) in enumerate(forms)])
+    return Block(
+        columns, [Hypothesis(n, eye[:, k : k + 1], 1, None, None, None, row) for k, (n, row) in enumerate(forms)]
+    )
 
 
 def contracting(clip: Clip, base: Base, angles: int = 6) -> Iterator[Block]:
@@ -357,8 +348,32 @@ def contracting(clip: Clip, base: Base, angles: int = 6) -> Iterator[Block]:
                     found.append(about)
         eye = np.eye(len(columns))
         yield Block(
-            np.stack(columns), [Hypothesis("active_contraction", eye[:, n : n + 1], 1, None, 0.0, None, b) for n, b in enumerate(found)]
+            np.stack(columns),
+            [Hypothesis("active_contraction", eye[:, n : n + 1], 1, None, 0.0, None, b) for n, b in enumerate(found)],
         )
+
+
+def gliding(clip: Clip, base: Base, memo: Memo) -> Iterator[Block]:
+    """A base that holds by friction: where it slides depends on where it slid, so the engine runs it, for a few caps."""
+    near, simulator = base.tangent, base.prepared.simulator
+    held, volume = clip.body.held, simulator.volume_p
+    spring = clip.density * float(np.trace(base.drive.stiffness[0])) / 3
+    across = np.eye(3) - np.outer(clip.normal, clip.normal)
+    pull = max(float(np.linalg.norm(near.displacement(f)[held] @ across, axis=1).max()) for f in near.frames) * spring
+    whole = float(volume[held].sum())
+    columns, found = [], []
+    for share in CAPS:
+        about = {"cap": share * pull * whole, "stiffness": spring * whole}
+        h = Hypothesis("sliding_base", np.ones((1, 1)), 1, None, None, None, about)
+        try:
+            moved = respond(clip, base, law_of(h, np.ones(1), clip), memo, clip.until)
+        except Breakdown:
+            continue
+        columns.append(moved - base.simulated[:, : clip.until])
+        found.append(h)
+    if columns:
+        eye = np.eye(len(columns))
+        yield Block(np.stack(columns), [replace(h, mix=eye[:, k : k + 1]) for k, h in enumerate(found)])
 
 
 def _wave(turns: np.ndarray) -> list[np.ndarray]:
@@ -369,7 +384,7 @@ def _wave(turns: np.ndarray) -> list[np.ndarray]:
     ]  # fmt: skip
 
 
-def blocks(clip: Clip, base: Base) -> Iterator[tuple[str, Callable[[], Iterator[Block]]]]:
+def blocks(clip: Clip, base: Base, memo: Memo) -> Iterator[tuple[str, Callable[[], Iterator[Block]]]]:
     """All that is tried, one part after the other, each made when it is asked for."""
     yield "laws of the whole body", lambda: iter([everywhere(clip, base)])
     yield "laws that remember", lambda: iter([remembering(clip, base)])
@@ -378,6 +393,8 @@ def blocks(clip: Clip, base: Base) -> Iterator[tuple[str, Callable[[], Iterator[
         yield "breathing", lambda: iter([breathing(clip, base)])
     if len(clip.motion.radius):
         yield "slipping grips", lambda: slipping(clip, base)
+    if clip.body.held.any() and len(clip.motion.radius):
+        yield "a gliding base", lambda: gliding(clip, base, memo)
     for depth in (0.15, 0.45):
         yield "lumps", lambda d=depth: iter([lumps(clip, base, places(clip, depth=d))])
     for center in places(clip):

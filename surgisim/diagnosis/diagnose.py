@@ -74,7 +74,8 @@ def diagnose(
     refits = []
     detected = laws[ranked[0]][0] > threshold(laws, settings)
     if detected:
-        for n, term in enumerate(ranked[: settings.refine]):
+        rivals = [t for t in ranked if laws[t][2][0].gain > calibration.RIVAL * laws[ranked[0]][2][0].gain]
+        for n, term in enumerate(rivals[: settings.refine]):
             progress(0.65 + 0.2 * n / settings.refine, 1, f"the engine with {term}")
             refits.append(refit(case, laws[term][2][0], laws[term][0], case.z))
         refits.sort(key=lambda r: -r.log_evidence)
@@ -93,11 +94,19 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     for frame in np.flatnonzero((phase == PHASES.index("release")) & (np.roll(phase, 1) != phase)):
         still[frame : frame + SETTLES] = False
     fitted = slice(0, until)
-    noise = estimate(clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, still[fitted], clip.recording.sigma[clip.kept])
+    noise = estimate(
+        clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, still[fitted], clip.recording.sigma[clip.kept]
+    )
     if settings.noise == "independent":
-        noise = replace(noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0)
+        noise = replace(
+            noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0
+        )
     whiten = whitener(noise, clip.rest, clip.seen[:, fitted], settings.offsets)
-    wrong = whiten(nuisance.simulator(clip, until, settings.model_error)).T if settings.model_error else np.zeros((3 * until * len(clip.kept), 1))
+    wrong = (
+        whiten(nuisance.simulator(clip, until, settings.model_error)).T
+        if settings.model_error
+        else np.zeros((3 * until * len(clip.kept), 1))
+    )
     base = fit_base(clip, whiten, wrong, memo, say=lambda text: progress(0.1, 1, text))
     parts = [wrong, whiten(nuisance.camera(clip, base.simulated[:, fitted])).T, whiten(base.slopes).T]
     if settings.model_error and len(clip.motion.radius):
@@ -111,7 +120,7 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
 def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress) -> list[Finding]:
     """Every hypothesis against a whitened residual."""
     residuals = np.concatenate([z[:, None].astype(np.float32), nulls], 1)
-    parts, found, source = list(blocks(case.clip, case.base)), [], 0
+    parts, found, source = list(blocks(case.clip, case.base, case.memo)), [], 0
     for n, (name, make) in enumerate(parts):
         progress(n / len(parts), f"trying {name} ({n + 1} of {len(parts)})")
         for block in make():
@@ -170,5 +179,3 @@ def another(case: Case, first: Refit, progress: Progress) -> tuple[Refit, float]
     if laws[best][0] < threshold(laws, case.settings):
         return None
     return refit(left, laws[best][2][0], laws[best][0], z), laws[best][0]
-
-

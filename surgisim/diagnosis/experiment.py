@@ -6,8 +6,9 @@ import numpy as np
 
 from surgisim.artifacts.motion import Motion
 from surgisim.diagnosis.base import Base
-from surgisim.diagnosis.candidates import ease, places
+from surgisim.diagnosis.candidates import places
 from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.hypothesis import ease
 from surgisim.diagnosis.laws import Law, respond
 from surgisim.diagnosis.memo import Memo
 from surgisim.mpm.simulator import Breakdown
@@ -20,7 +21,11 @@ def separating(clip: Clip, base: Base, first: Law, second: Law, memo: Memo, name
     """The pull, of a few, under which the two laws differ most, in words."""
     best = None
     for text, motion in pulls(clip, rng):
-        trial = replace(clip, recording=replace(clip.recording, motion=motion), moved=np.zeros((len(clip.kept), motion.active.shape[1], 3)))
+        trial = replace(
+            clip,
+            recording=replace(clip.recording, motion=motion),
+            moved=np.zeros((len(clip.kept), motion.active.shape[1], 3)),
+        )
         try:
             seen = [respond(trial, base, replace(law, motion=None, begins=0.0), memo) for law in (first, second)]
         except Breakdown:

@@ -6,10 +6,10 @@ from surgisim.artifacts.diagnosis import Diagnosis
 from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.diagnosis import calibration, words
-from surgisim.diagnosis.candidates import Hypothesis
 from surgisim.diagnosis.clip import PHASES
 from surgisim.diagnosis.experiment import separating
 from surgisim.diagnosis.flexible import smooth_part
+from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import described, law_of, respond
 from surgisim.diagnosis.locate import cause, of_places, symptom
 from surgisim.mpm.simulator import Breakdown
@@ -50,7 +50,10 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
     fit, held_out = _errors(case, after, placebo)
     z, reach = symptom(clip, case.noise, _residual(case, base.simulated, False), rng)
     freed = case.z - case.space.explained(case.z)
-    cleared = case.nulls - case.space.columns @ np.linalg.lstsq(_eye(case), case.space.seen_through(case.nulls), rcond=None)[0]
+    cleared = (
+        case.nulls
+        - case.space.columns @ np.linalg.lstsq(_eye(case), case.space.seen_through(case.nulls), rcond=None)[0]
+    )
     heat, when = cause(base, case.whiten, freed, cleared)
     heat = heat / max(heat.max(), 1e-30)
     if effects and refits[0].finding.hypothesis.place is not None and refits[0].finding.hypothesis.place.normal is None:
@@ -74,7 +77,8 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         unexplained_fraction=float(np.clip(1 - explained, 0, 1)) if detected else 0.0,
         words=said,
         base=_base(base),
-        noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(case.noise).items()} | {"sigma": case.noise.sigma, "unit": "m"},
+        noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(case.noise).items()}
+        | {"sigma": case.noise.sigma, "unit": "m"},
         global_test={
             "log_evidence": float(laws[ranked[0]][0]),
             "nulls": np.round(np.max([n for _, n, _ in laws.values()], 0), 3).tolist(),
@@ -135,14 +139,28 @@ def _effect(case, r, chances, laws, refits, number) -> dict:
     center, extent = place_of(laws[r.term][2]) if h.place is not None else (None, None)
     if r.term == "tool_slip":
         center, extent = np.array(h.place.center), h.place.extent
-    runners = [{"term": t, "probability": chances[t]} for t in sorted(chances, key=lambda t: -chances[t]) if t != r.term]
+    runners = [
+        {"term": t, "probability": chances[t]} for t in sorted(chances, key=lambda t: -chances[t]) if t != r.term
+    ]
     local = h.place is not None and h.place.normal is None
     return {
         "term": r.term,
-        "probability": chances[r.term] if number == 0 else float(1 / (1 + np.exp(-(r.log_evidence - calibration.THRESHOLD) / (calibration.TEMPERATURE + calibration.MISFIT * r.gain)))),
-        "place": {"center": [float(c) for c in center], "extent": float(extent), "unit": "m"} if local else "everywhere",
+        "probability": chances[r.term]
+        if number == 0
+        else float(
+            1
+            / (
+                1
+                + np.exp(
+                    -(r.log_evidence - calibration.THRESHOLD) / (calibration.TEMPERATURE + calibration.MISFIT * r.gain)
+                )
+            )
+        ),
+        "place": {"center": [float(c) for c in center], "extent": float(extent), "unit": "m"}
+        if local
+        else "everywhere",
         "time": {"onset": None if h.onset is None else float(h.onset), "end": None if h.end is None else float(h.end)},
-        "parameters": described(h, r.amplitude, r.finding.spread, case.clip),
+        "parameters": described(h, r.amplitude, r.finding.spread, case.clip, case.base),
         "runners_up": runners[:RUNNERS],
         "separating_experiment": "",
         "log_evidence": float(r.log_evidence),
@@ -182,7 +200,9 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
         result.append(
             {
                 "term": term,
-                "place": "everywhere" if place is None else {"center": [float(c) for c in place.center], "extent": float(place.extent), "unit": "m"},
+                "place": "everywhere"
+                if place is None
+                else {"center": [float(c) for c in place.center], "extent": float(place.extent), "unit": "m"},
                 "log_evidence": float(laws[term][0] if r is None else r.log_evidence),
                 "probability": chances[term],
                 "gain": float(f.gain if r is None else r.gain),
@@ -218,7 +238,9 @@ def _rms(case, simulated) -> tuple[float, float | None]:
 def _errors(case, after, placebo) -> tuple[dict, dict]:
     clip, until = case.clip, case.clip.until
     floor = 1e3 * np.sqrt(3) * case.noise.sigma
-    rows = {name: _rms(case, s) for name, s in (("before", case.base.simulated), ("after", after), ("placebo", placebo))}
+    rows = {
+        name: _rms(case, s) for name, s in (("before", case.base.simulated), ("after", after), ("placebo", placebo))
+    }
     left = _residual(case, case.base.simulated, False)
     parts = []
     for span in (slice(0, until), slice(until, clip.frames)):
@@ -230,7 +252,9 @@ def _errors(case, after, placebo) -> tuple[dict, dict]:
         parts.append(1e3 * float(np.sqrt(((left[:, span] - smooth)[seen] ** 2).sum(-1).mean())))
     result = []
     for k in (0, 1):
-        result.append({"noise_floor": float(floor), **{n: r[k] for n, r in rows.items()}, "flexible": parts[k], "unit": "mm"})
+        result.append(
+            {"noise_floor": float(floor), **{n: r[k] for n, r in rows.items()}, "flexible": parts[k], "unit": "mm"}
+        )
     low, high = _bootstrap(case, after)
     result[1]["gain_low"], result[1]["gain_high"] = low, high
     return result[0], result[1]
@@ -253,8 +277,21 @@ def _placebo(case, refits, laws, rng) -> np.ndarray:
     """The same law at a wrong place, or a wrong law, with its strength fitted all the same."""
     first = refits[0].finding.hypothesis
     mine = laws[refits[0].term][2]
-    far = [f for f in mine if f.hypothesis.place is not None and np.linalg.norm(np.subtract(f.hypothesis.place.center, first.place.center)) > 0.012] if first.place is not None else []
-    others = far or [laws[t][2][0] for t in sorted(laws) if t not in {r.term for r in refits[:2]} and laws[t][2][0].hypothesis.mix.shape[1] <= 3]
+    far = (
+        [
+            f
+            for f in mine
+            if f.hypothesis.place is not None
+            and np.linalg.norm(np.subtract(f.hypothesis.place.center, first.place.center)) > 0.012
+        ]
+        if first.place is not None
+        else []
+    )
+    others = far or [
+        laws[t][2][0]
+        for t in sorted(laws)
+        if t not in {r.term for r in refits[:2]} and laws[t][2][0].hypothesis.mix.shape[1] <= 3
+    ]
     if not others:
         return case.base.simulated
     chosen = others[int(rng.integers(len(others)))]
@@ -270,7 +307,12 @@ def _base(base) -> dict:
     return {
         "E": {"value": E, "low": E * float(np.exp(-s[0])), "high": E * float(np.exp(s[0])), "unit": "Pa"},
         "nu": {"value": nu, "low": nu - float(s[1]), "high": nu + float(s[1]), "unit": "1"},
-        "eta": {"value": E * lag, "low": E * lag * float(np.exp(-s[2])), "high": E * lag * float(np.exp(s[2])), "unit": "Pa s"},
+        "eta": {
+            "value": E * lag,
+            "low": E * lag * float(np.exp(-s[2])),
+            "high": E * lag * float(np.exp(s[2])),
+            "unit": "Pa s",
+        },
     }
 
 
@@ -281,9 +323,20 @@ def physics(case, refits) -> Physics:
     if refits:
         law = law_of(refits[0].finding.hypothesis, refits[0].amplitude, clip)
         values |= law.values
-        places = {n: {"center": [float(c) for c in p.center], "extent": float(p.extent), "normal": None if p.normal is None else [float(c) for c in p.normal]} for n, p in law.places.items()}
+        places = {
+            n: {
+                "center": [float(c) for c in p.center],
+                "extent": float(p.extent),
+                "normal": None if p.normal is None else [float(c) for c in p.normal],
+            }
+            for n, p in law.places.items()
+        }
     terms = {
-        name: {key: {"value": float(value), "unit": term.params[key].unit} | {k: known[key][k] for k in ("low", "high") if name in base.values and key in known} for key, value in values[name].items()}
+        name: {
+            key: {"value": float(value), "unit": term.params[key].unit}
+            | {k: known[key][k] for k in ("low", "high") if name in base.values and key in known}
+            for key, value in values[name].items()
+        }
         for name, term in choose(values).items()
     }
     return Physics(
@@ -309,5 +362,3 @@ def _words(case, verdict, refits, effects, explained, laws, z) -> str:
     if verdict == "equivalence class":
         said += f" {effects[0]['runners_up'][0]['term']} would look nearly the same."
     return said
-
-

@@ -1,6 +1,6 @@
 """Two plain sentences for a verdict."""
 
-from surgisim.diagnosis.candidates import Hypothesis
+from surgisim.diagnosis.hypothesis import Hypothesis
 
 SAYS = {
     "hidden_contact": ("something unseen pushes the tissue {where} from {onset} to {end}", "a push there ({amount})"),
@@ -27,7 +27,11 @@ def sentence(h: Hypothesis, parameters: dict[str, dict], gained: float, size: fl
     seen, law = SAYS[h.term]
     where = "" if h.place is None else f"near ({', '.join(f'{1e3 * c:.0f}' for c in h.place.center)}) mm"
     first = next(iter(parameters.items()), None)
-    amount = "" if first is None else f"{first[0]} = {first[1]['value']:.3g} {first[1]['unit']}, {first[1]['low']:.3g} to {first[1]['high']:.3g}"
+    amount = (
+        ""
+        if first is None
+        else f"{first[0]} = {first[1]['value']:.3g} {first[1]['unit']}, {first[1]['low']:.3g} to {first[1]['high']:.3g}"
+    )
     softer = "s" in parameters and parameters["s"]["value"] < 1
     said = seen.format(
         where=where, onset=_moment(h.onset), end=_moment(h.end), less="more" if softer else "less",
