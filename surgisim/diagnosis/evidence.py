@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
-from surgisim.diagnosis.candidates import Block
+from surgisim.diagnosis.form import Block
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.metric import Metric
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from surgisim.artifacts.motion import Motion
 from surgisim.diagnosis.base import Base
-from surgisim.diagnosis.candidates import places
 from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.form import places
 from surgisim.diagnosis.hypothesis import ease
 from surgisim.diagnosis.laws import Law, respond
 from surgisim.diagnosis.memo import Memo
@@ -57,6 +57,9 @@ def pulls(clip: Clip, rng: np.random.Generator) -> list[tuple[str, Motion]]:
             active = (time <= PULL + HOLD)[None]
             motion = Motion(center[None], np.array([radius]), path[None], active, np.ones(1), "given")
             at = ", ".join(f"{1e3 * c:.0f}" for c in center)
-            text = f"Grasp near ({at}) mm, pull {1e3 * length:.0f} mm {name} along ({', '.join(f'{c:.2f}' for c in way)}), hold {HOLD:g} s and release"
+            along = ", ".join(f"{c:.2f}" for c in way)
+            text = (
+                f"Grasp near ({at}) mm, pull {1e3 * length:.0f} mm {name} along ({along}), hold {HOLD:g} s and release"
+            )
             result.append((text, motion))
     return result

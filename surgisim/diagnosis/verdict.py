@@ -7,13 +7,13 @@ from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.diagnosis import calibration, words
 from surgisim.diagnosis.clip import PHASES
+from surgisim.diagnosis.errors import errors, residual, rms
 from surgisim.diagnosis.experiment import separating
-from surgisim.diagnosis.flexible import smooth_part
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import described, law_of, respond
 from surgisim.diagnosis.locate import cause, of_places, symptom
+from surgisim.diagnosis.model import base_numbers, physics
 from surgisim.mpm.simulator import Breakdown
-from surgisim.physics.catalogue import choose
 
 RUNNERS = 4
 
@@ -47,8 +47,8 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
             for effect in effects:
                 effect["probability"] = min(effect["probability"], explained / 2)
     placebo = _placebo(case, refits, laws, rng) if detected else base.simulated
-    fit, held_out = _errors(case, after, placebo)
-    z, reach = symptom(clip, case.noise, _residual(case, base.simulated, False), rng)
+    fit, held_out = errors(case, after, placebo)
+    z, reach = symptom(clip, case.noise, residual(case, base.simulated, False), rng)
     freed = case.z - case.space.explained(case.z)
     cleared = (
         case.nulls
@@ -76,7 +76,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         held_out=held_out,
         unexplained_fraction=float(np.clip(1 - explained, 0, 1)) if detected else 0.0,
         words=said,
-        base=_base(base),
+        base=base_numbers(base),
         noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(case.noise).items()}
         | {"sigma": case.noise.sigma, "unit": "m"},
         global_test={
@@ -87,8 +87,8 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
     )
     mismatch = Mismatch(
         points=clip.rest,
-        residual_before=_residual(case, base.simulated),
-        residual_after=_residual(case, after if verdict != "unexplained" else base.simulated),
+        residual_before=residual(case, base.simulated),
+        residual_after=residual(case, after if verdict != "unexplained" else base.simulated),
         z=z,
         significant=reach,
         particles=base.prepared.simulator.rest,
@@ -169,7 +169,7 @@ def _effect(case, r, chances, laws, refits, number) -> dict:
 
 
 def place_of(findings) -> tuple[np.ndarray, float]:
-    """Mean centre [m] of the places near the best, by evidence, and the radius at which the law has fallen to a half."""
+    """Mean centre [m] of the places near the best, by evidence, and the radius at which the law is down to a half."""
     best = findings[0].hypothesis.place
     logs = np.array([f.log_evidence for f in findings])
     centers = np.array([f.hypothesis.place.center for f in findings])
@@ -196,7 +196,7 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
         r = run.get(term)
         held = None
         if r is not None and case.clip.frames > case.clip.until:
-            held = _rms(case, case.base.simulated + r.response)[1]
+            held = rms(case, case.base.simulated + r.response)[1]
         result.append(
             {
                 "term": term,
@@ -213,64 +213,6 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
             }
         )
     return result
-
-
-def _residual(case, simulated, nan: bool = True) -> np.ndarray:
-    """Recording less prediction less each point's own constant [m], (K, T, 3)."""
-    clip, until = case.clip, case.clip.until
-    left = np.where(clip.seen[..., None], clip.moved - simulated, 0.0)
-    if case.settings.offsets:
-        count = np.maximum(clip.seen[:, :until].sum(1), 1)
-        left = left - (left[:, :until].sum(1) / count[:, None])[:, None]
-    return np.where(clip.seen[..., None], left, np.nan if nan else 0.0)
-
-
-def _rms(case, simulated) -> tuple[float, float | None]:
-    """On fitted frames and on those held out [mm]."""
-    left, until = _residual(case, simulated), case.clip.until
-    square = (left**2).sum(-1)
-    fitted = 1e3 * float(np.sqrt(np.nanmean(square[:, :until])))
-    if case.clip.frames == until or not case.clip.seen[:, until:].any():
-        return fitted, None
-    return fitted, 1e3 * float(np.sqrt(np.nanmean(square[:, until:])))
-
-
-def _errors(case, after, placebo) -> tuple[dict, dict]:
-    clip, until = case.clip, case.clip.until
-    floor = 1e3 * np.sqrt(3) * case.noise.sigma
-    rows = {
-        name: _rms(case, s) for name, s in (("before", case.base.simulated), ("after", after), ("placebo", placebo))
-    }
-    left = _residual(case, case.base.simulated, False)
-    parts = []
-    for span in (slice(0, until), slice(until, clip.frames)):
-        seen = clip.seen[:, span]
-        if not seen.any():
-            parts.append(None)
-            continue
-        smooth = smooth_part(clip, left[:, span], seen)
-        parts.append(1e3 * float(np.sqrt(((left[:, span] - smooth)[seen] ** 2).sum(-1).mean())))
-    result = []
-    for k in (0, 1):
-        result.append(
-            {"noise_floor": float(floor), **{n: r[k] for n, r in rows.items()}, "flexible": parts[k], "unit": "mm"}
-        )
-    low, high = _bootstrap(case, after)
-    result[1]["gain_low"], result[1]["gain_high"] = low, high
-    return result[0], result[1]
-
-
-def _bootstrap(case, after, draws: int = 200) -> tuple[float | None, float | None]:
-    """90 % interval of what the law takes off the held-out mean square [mm^2], points drawn again."""
-    clip, until = case.clip, case.clip.until
-    if clip.frames == until or not clip.seen[:, until:].any():
-        return None, None
-    square = [(_residual(case, s, False)[:, until:] ** 2).sum((1, 2)) for s in (case.base.simulated, after)]
-    count = clip.seen[:, until:].sum(1)
-    rng = np.random.default_rng([case.settings.seed, 2])
-    chosen = rng.integers(0, len(count), (draws, len(count)))
-    gains = 1e6 * (square[0] - square[1])[chosen].sum(1) / np.maximum(count[chosen].sum(1), 1)
-    return float(np.quantile(gains, 0.05)), float(np.quantile(gains, 0.95))
 
 
 def _placebo(case, refits, laws, rng) -> np.ndarray:
@@ -299,50 +241,6 @@ def _placebo(case, refits, laws, rng) -> np.ndarray:
         return respond(case.clip, case.base, law_of(chosen.hypothesis, chosen.amplitude, case.clip), case.memo)
     except Breakdown:
         return case.base.simulated
-
-
-def _base(base) -> dict:
-    E, nu, lag = float(np.exp(base.x[0])), float(base.x[1]), float(np.exp(base.x[2]))
-    s = 1.645 * base.spread
-    return {
-        "E": {"value": E, "low": E * float(np.exp(-s[0])), "high": E * float(np.exp(s[0])), "unit": "Pa"},
-        "nu": {"value": nu, "low": nu - float(s[1]), "high": nu + float(s[1]), "unit": "1"},
-        "eta": {
-            "value": E * lag,
-            "low": E * lag * float(np.exp(-s[2])),
-            "high": E * lag * float(np.exp(s[2])),
-            "unit": "Pa s",
-        },
-    }
-
-
-def physics(case, refits) -> Physics:
-    """The base's laws, and the named one, with the grid and the step they were fitted on."""
-    clip, base = case.clip, case.base
-    values, places, known = dict(base.values), {}, _base(base)
-    if refits:
-        law = law_of(refits[0].finding.hypothesis, refits[0].amplitude, clip)
-        values |= law.values
-        places = {
-            n: {
-                "center": [float(c) for c in p.center],
-                "extent": float(p.extent),
-                "normal": None if p.normal is None else [float(c) for c in p.normal],
-            }
-            for n, p in law.places.items()
-        }
-    terms = {
-        name: {
-            key: {"value": float(value), "unit": term.params[key].unit}
-            | {k: known[key][k] for k in ("low", "high") if name in base.values and key in known}
-            for key, value in values[name].items()
-        }
-        for name, term in choose(values).items()
-    }
-    return Physics(
-        terms=terms, density=float(clip.density), gravity=[0.0, 0.0, 0.0],
-        grid={"spacing": float(clip.body.spacing), "step": float(base.drive.step)}, places=places,
-    )  # fmt: skip
 
 
 def _eye(case) -> np.ndarray:
