@@ -4,7 +4,7 @@ from surgisim.diagnosis.hypothesis import Hypothesis
 
 SAYS = {
     "hidden_contact": ("something unseen pushes the tissue {where} from {onset} to {end}", "a push there ({amount})"),
-    "added_mass": ("the tissue sags {where} from {onset} on, as under something laid on it", "a weight there ({amount})"),
+    "added_mass": ("the tissue sags {where} from {onset} on, as under a load", "a weight there ({amount})"),
     "tether": ("the tissue {where} is held back once it has moved, as by an adhesion", "a band there ({amount})"),
     "gravity": ("all tissue shifts one way from {onset} on, as on a tilted table", "that change of weight ({amount})"),
     "respiration": ("the base moves to and fro, touched or not, as with breathing", "a moving base ({amount})"),
@@ -14,7 +14,7 @@ SAYS = {
     "stiffening": ("the tissue resists the more the further it is strained", "strain stiffening ({amount})"),
     "fibre": ("the tissue resists being stretched along one direction", "strands in that direction ({amount})"),
     "pretension": ("the tissue resists bending and lifting as something taut does", "a tension at rest ({amount})"),
-    "relaxation": ("the tissue gives way while held and creeps back after the release", "a stiffness that fades ({amount})"),
+    "relaxation": ("tissue gives way while held and creeps back after the release", "stiffness that fades ({amount})"),
     "plastic_set": ("the tissue does not come back all the way after the release", "a lasting set ({amount})"),
     "damage": ("the tissue is softer after it has been strained than before", "damage ({amount})"),
     "active_contraction": ("the tissue contracts by itself, in waves", "muscle that pulls ({amount})"),

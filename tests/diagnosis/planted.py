@@ -19,7 +19,8 @@ NOISE = dict(shared=0.3, length=0.006, rigid=0.02, tilt=0.02, keep_shared=0.6, l
 
 def block() -> Mesh:
     corner = (np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) - [0.5, 0.5, 0]) * SIZE
-    faces = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]  # fmt: skip
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [(a, *pair) for a, b, c, d in sides for pair in ((b, c), (c, d))]
     return Mesh(corner, np.array(faces))
 
 
@@ -36,7 +37,8 @@ def recording(values=None, places=None, seed=0, sigma=1.5e-4, grips=True) -> Rec
     )
     held = np.array([[[-0.1, -0.1, -1.0], [0.1, 0.1, 0.0025]]])
     made = Recording(
-        name="planted", fps=FPS, mesh=block(), boxes=held, points=np.repeat(rest[:, None], FRAMES, 1).astype(np.float32),
+        name="planted", fps=FPS, mesh=block(), boxes=held,
+        points=np.repeat(rest[:, None], FRAMES, 1).astype(np.float32),
         visible=np.ones((len(rest), FRAMES), bool), sigma=np.full(len(rest), sigma), motion=motion, density=1050.0,
         gravity=(0.0, 0.0, -9.81), place=rest, split={"fit": (0, FIT), "held_out": (FIT, FRAMES)},
     )  # fmt: skip
