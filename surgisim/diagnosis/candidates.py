@@ -14,8 +14,11 @@ from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import Block, places
 from surgisim.diagnosis.memo import Memo
 
+Parts = Iterator[tuple[str, Callable[[], Iterator[Block]]]]
+"""Names of parts, and what makes their blocks."""
 
-def blocks(clip: Clip, base: Base, memo: Memo) -> Iterator[tuple[str, Callable[[], Iterator[Block]]]]:
+
+def blocks(clip: Clip, base: Base) -> Parts:
     """All that is tried, one part after the other, each made when it is asked for."""
     yield "laws of the whole body", lambda: iter([whole.everywhere(clip, base)])
     yield "laws that remember", lambda: iter([memory.remembering(clip, base)])
@@ -24,10 +27,14 @@ def blocks(clip: Clip, base: Base, memo: Memo) -> Iterator[tuple[str, Callable[[
         yield "breathing", lambda: iter([whole.breathing(clip, base)])
     if len(clip.motion.radius):
         yield "slipping grips", lambda: local.slipping(clip, base)
-    if clip.body.held.any() and len(clip.motion.radius):
-        yield "a gliding base", lambda: memory.gliding(clip, base, memo)
     for depth in (0.15, 0.45):
         yield "lumps", lambda d=depth: iter([local.lumps(clip, base, places(clip, depth=d))])
     for center in places(clip):
         yield "pushes and bands", lambda c=center: iter([local.pushes(clip, base, c)])
     yield "contractions", lambda: whole.contracting(clip, base)
+
+
+def costly(clip: Clip, base: Base, memo: Memo) -> Parts:
+    """What only runs of the engine can tell; tried where nothing else explains enough."""
+    if clip.body.held.any() and len(clip.motion.radius):
+        yield "a gliding base", lambda: memory.gliding(clip, base, memo)

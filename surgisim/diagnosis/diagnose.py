@@ -11,7 +11,7 @@ from surgisim.artifacts.physics import Physics
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, nuisance, verdict
 from surgisim.diagnosis.base import Base, fit_base
-from surgisim.diagnosis.candidates import blocks
+from surgisim.diagnosis.candidates import Parts, blocks, costly
 from surgisim.diagnosis.clip import PHASES, Clip, clip_of
 from surgisim.diagnosis.evidence import Finding, by_law, judge
 from surgisim.diagnosis.flexible import flexible
@@ -69,10 +69,13 @@ def diagnose(
     case = prepare_case(clip, settings, memo, progress)
     findings = search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.4 * s, 1, text))
     laws = by_law(findings)
-    ranked = sorted(laws, key=lambda term: -laws[term][0])
     bend = flexible(case.clip, case.whiten, case.space, case.z)
-    refits = []
-    detected = laws[ranked[0]][0] > threshold(laws, settings)
+    detected = max(entry[0] for entry in laws.values()) > threshold(laws, settings)
+    if detected and max(f.gain for f in findings) < calibration.EXPLAINED_WELL * bend.gain:
+        parts = costly(clip, case.base, memo)
+        findings += search(case, case.z, case.nulls, lambda s, text: progress(0.62, 1, text), parts)
+        laws = by_law(findings)
+    ranked, refits = sorted(laws, key=lambda term: -laws[term][0]), []
     if detected:
         rivals = [t for t in ranked if laws[t][2][0].gain > calibration.RIVAL * laws[ranked[0]][2][0].gain]
         for n, term in enumerate(rivals[: settings.refine]):
@@ -117,10 +120,10 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     return Case(clip, settings, noise, whiten, base, space, memo, z, nulls)
 
 
-def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress) -> list[Finding]:
-    """Every hypothesis against a whitened residual."""
+def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts | None = None) -> list[Finding]:
+    """Every hypothesis of `parts` (or of all that is cheap) against a whitened residual."""
     residuals = np.concatenate([z[:, None].astype(np.float32), nulls], 1)
-    parts, found, source = list(blocks(case.clip, case.base, case.memo)), [], 0
+    parts, found, source = list(parts or blocks(case.clip, case.base)), [], 0
     for n, (name, make) in enumerate(parts):
         progress(n / len(parts), f"trying {name} ({n + 1} of {len(parts)})")
         for block in make():

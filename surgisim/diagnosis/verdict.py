@@ -50,10 +50,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
     fit, held_out = errors(case, after, placebo)
     z, reach = symptom(clip, case.noise, residual(case, base.simulated, False), rng)
     freed = case.z - case.space.explained(case.z)
-    cleared = (
-        case.nulls
-        - case.space.columns @ np.linalg.lstsq(_eye(case), case.space.seen_through(case.nulls), rcond=None)[0]
-    )
+    cleared = case.nulls - case.space.explained(case.nulls)
     heat, when = cause(base, case.whiten, freed, cleared)
     heat = heat / max(heat.max(), 1e-30)
     if effects and refits[0].finding.hypothesis.place is not None and refits[0].finding.hypothesis.place.normal is None:
@@ -241,11 +238,6 @@ def _placebo(case, refits, laws, rng) -> np.ndarray:
         return respond(case.clip, case.base, law_of(chosen.hypothesis, chosen.amplitude, case.clip), case.memo)
     except Breakdown:
         return case.base.simulated
-
-
-def _eye(case) -> np.ndarray:
-    U = case.space.columns
-    return np.eye(U.shape[1]) + (U.T @ U).astype(float)
 
 
 def _words(case, verdict, refits, effects, explained, laws, z) -> str:
