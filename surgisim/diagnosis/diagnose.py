@@ -157,9 +157,11 @@ def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: 
         white = case.whiten(change[:, :until])[:, None]
         G, b = float(case.space.gram(white, white)[0, 0]), float(case.space.gram(white, z[:, None])[0, 0])
         best = b / max(G, 1e-12)
-        mine = 2 * b - G
+        # Near its best strength a response may be scaled; far from it, only another run tells.
+        scale = float(np.clip(best, 0.7, 1.4))
+        mine = 2 * scale * b - scale**2 * G
         if mine > gain:
-            gain, response, kept = mine, change, amplitude.copy()
+            gain, response, kept = mine, scale * change, scale * amplitude
         if abs(best - 1) < 0.1 or best <= 0:
             break
         amplitude = amplitude * float(np.clip(best, 0.4, 2.5))

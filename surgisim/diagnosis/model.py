@@ -3,7 +3,7 @@
 import numpy as np
 
 from surgisim.artifacts.physics import Physics
-from surgisim.diagnosis.laws import law_of
+from surgisim.diagnosis.laws import law_of, steps
 from surgisim.physics.catalogue import choose
 
 
@@ -25,10 +25,17 @@ def base_numbers(base) -> dict:
 def physics(case, refits) -> Physics:
     """The base's laws, and the named one, with the grid and the step they were fitted on."""
     clip, base = case.clip, case.base
+    step = base.drive.step
     values, places, known = dict(base.values), {}, base_numbers(base)
     if refits:
         law = law_of(refits[0].finding.hypothesis, refits[0].amplitude, clip)
         values |= law.values
+        if law.values:
+            prepared = clip.prepared(tuple(values))
+            step = 1 / clip.fps / steps(clip, base, prepared, prepared.theta(values, law.places))
+        h = refits[0].finding.hypothesis
+        if h.term == "tool_slip":
+            values["tool_slip"] = {"slip": min(float(refits[0].amplitude[0]), 1.0), "onset": float(h.onset)}
         places = {
             n: {
                 "center": [float(c) for c in p.center],
@@ -47,5 +54,5 @@ def physics(case, refits) -> Physics:
     }
     return Physics(
         terms=terms, density=float(clip.density), gravity=[0.0, 0.0, 0.0],
-        grid={"spacing": float(clip.body.spacing), "step": float(base.drive.step)}, places=places,
+        grid={"spacing": float(clip.body.spacing), "step": float(step)}, places=places,
     )  # fmt: skip
