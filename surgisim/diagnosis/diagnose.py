@@ -19,6 +19,7 @@ from surgisim.diagnosis.laws import law_of, respond
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
+from surgisim.diagnosis.refine import refined
 from surgisim.mpm.simulator import Breakdown
 from surgisim.recordings.recording import Recording
 
@@ -37,6 +38,8 @@ class Refit:
     """What it adds to the base at this amplitude over the whole clip [m], (K, T, 3)."""
     gain: float
     log_evidence: float
+    free: bool = False
+    """Whether its place, time and form were fitted too."""
 
     @property
     def term(self) -> str:
@@ -81,6 +84,10 @@ def diagnose(
         for n, term in enumerate(rivals[: settings.refine]):
             progress(0.65 + 0.2 * n / settings.refine, 1, f"the engine with {term}")
             refits.append(refit(case, laws[term][2][0], laws[term][0], case.z))
+        refits.sort(key=lambda r: -r.log_evidence)
+        for n, one in enumerate(refits[: settings.polish]):
+            done = 0.75 + 0.1 * n / settings.polish
+            refits[n] = polished(case, one, case.z, lambda text, done=done: progress(done, 1, text))
         refits.sort(key=lambda r: -r.log_evidence)
     second = None
     if detected and settings.second and refits[0].gain < calibration.EXPLAINED_WELL * bend.gain:
@@ -168,6 +175,17 @@ def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: 
     if response is None:
         return Refit(finding, finding.amplitude, np.zeros_like(base.simulated), 0.0, -np.inf)
     return Refit(finding, kept, response, gain, evidence + 0.5 * (gain - finding.gain))
+
+
+def polished(case: Case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
+    """The same law with everything about it free; as it was where that gains nothing."""
+    start = one.finding.hypothesis, one.amplitude
+    found = refined(case.clip, case.base, case.whiten, case.space, case.memo, z, start, say)
+    if found is None or found.gain <= one.gain:
+        return one
+    finding = replace(one.finding, hypothesis=found.hypothesis, spread=found.spread)
+    better = {"finding": finding, "amplitude": found.amplitude, "response": found.response, "gain": found.gain}
+    return replace(one, **better, log_evidence=one.log_evidence + 0.5 * (found.gain - one.gain), free=True)
 
 
 def another(case: Case, first: Refit, progress: Progress) -> tuple[Refit, float] | None:

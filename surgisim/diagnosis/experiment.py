@@ -21,11 +21,7 @@ def separating(clip: Clip, base: Base, first: Law, second: Law, memo: Memo, name
     """The pull, of a few, under which the two laws differ most, in words."""
     best = None
     for text, motion in pulls(clip, rng):
-        trial = replace(
-            clip,
-            recording=replace(clip.recording, motion=motion),
-            moved=np.zeros((len(clip.kept), motion.active.shape[1], 3)),
-        )
+        trial = _instead(clip, motion)
         try:
             seen = [respond(trial, base, replace(law, motion=None, begins=0.0), memo) for law in (first, second)]
         except Breakdown:
@@ -36,6 +32,17 @@ def separating(clip: Clip, base: Base, first: Law, second: Law, memo: Memo, name
     if best is None:
         return f"None of the pulls tried can be simulated with both {names[0]} and {names[1]}."
     return f"{best[1]}: {names[0]} and {names[1]} would then differ by {1e3 * best[0]:.2g} mm RMS."
+
+
+def _instead(clip: Clip, motion: Motion) -> Clip:
+    """The same body under another motion, with nothing recorded of it."""
+    recording, frames = clip.recording, motion.active.shape[1]
+    shape = (len(recording.sigma), frames)
+    unseen = np.full((*shape, 3), np.nan, np.float32)
+    planned = replace(
+        recording, motion=motion, points=unseen, visible=np.zeros(shape, bool), place=recording.attached(), split=None
+    )
+    return replace(clip, recording=planned, moved=np.zeros((len(clip.kept), frames, 3)))
 
 
 def pulls(clip: Clip, rng: np.random.Generator) -> list[tuple[str, Motion]]:

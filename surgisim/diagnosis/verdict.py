@@ -134,6 +134,8 @@ def missing(clip) -> list[str]:
 def _effect(case, r, chances, laws, refits, number) -> dict:
     h: Hypothesis = r.finding.hypothesis
     center, extent = place_of(laws[r.term][2]) if h.place is not None else (None, None)
+    if r.free and h.place is not None:
+        center, extent = np.array(h.place.center), float(np.sqrt(2 * np.log(2)) * h.place.extent)
     if r.term == "tool_slip":
         center, extent = np.array(h.place.center), h.place.extent
     runners = [
