@@ -75,7 +75,9 @@ def fit_base(
         drive, run = simulate(prepared, clip, x, memo, clip.frames if last else until)
         simulated = carried(carry, run)
         near = tangent(prepared, values_of(x), drive, run, clip.rest, until)
-        around = _Around(clip, whiten, space, memo, prepared, carry, x, run, simulated[:, :until], _by_poisson(prepared, near, x))
+        around = _Around(
+            clip, whiten, space, memo, prepared, carry, x, run, simulated[:, :until], _by_poisson(prepared, near, x)
+        )
         if not last:
             x = around.descend(around.start() if iteration == 0 else x, say)
     slopes = around.slopes(x)
