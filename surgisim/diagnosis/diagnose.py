@@ -19,8 +19,8 @@ from surgisim.diagnosis.laws import law_of, respond
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
-from surgisim.diagnosis.polish import finer
 from surgisim.diagnosis.refine import refined
+from surgisim.diagnosis.sharpen import finer
 from surgisim.mpm.simulator import Breakdown
 from surgisim.recordings.recording import Recording
 

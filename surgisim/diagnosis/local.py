@@ -17,7 +17,7 @@ BLOB = 0.0032
 LASTS = (0.5, 0.8, 1.2, 2.0)
 """How long an unseen push is tried [s]."""
 SHIFTS = (-0.1, -0.05, 0.0, 0.05, 0.1)
-"""By which moments are moved when a hypothesis is polished [s]."""
+"""By which moments are moved when a hypothesis is sharpened [s]."""
 LUMP = 0.0040
 """Extent of a lump, likewise [m]."""
 

@@ -152,7 +152,7 @@ def _turned(h: Hypothesis, amplitude: np.ndarray, knobs, x: np.ndarray, clip: Cl
     """The hypothesis and its amplitude with every knob turned by x standard deviations."""
     amplitude, about, place = amplitude.astype(float).copy(), dict(h.about), h.place
     moments = {"onset": h.onset, "end": h.end}
-    for (kind, which, sd), by in zip(knobs, x * np.array([k[2] for k in knobs]), strict=True):
+    for (kind, which, _), by in zip(knobs, x * np.array([k[2] for k in knobs]), strict=True):
         if kind == "strength":
             amplitude[0] *= np.exp(by)
         elif kind == "amplitude":
