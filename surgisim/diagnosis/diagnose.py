@@ -12,7 +12,7 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, nuisance, verdict
 from surgisim.diagnosis.base import Base, fit_base
 from surgisim.diagnosis.candidates import Parts, blocks, costly
-from surgisim.diagnosis.clip import PHASES, Clip, clip_of
+from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.evidence import Finding, by_law, judge
 from surgisim.diagnosis.flexible import flexible
 from surgisim.diagnosis.laws import law_of, respond
@@ -25,8 +25,6 @@ from surgisim.mpm.simulator import Breakdown
 from surgisim.recordings.recording import Recording
 
 Progress = Callable[[float, float, str], None]
-SETTLES = 4
-"""Frames after a release that are not taken as still."""
 
 
 @dataclass(frozen=True)
@@ -101,13 +99,10 @@ def diagnose(
 
 def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress) -> Case:
     """Noise, base, nuisances."""
-    until, phase = clip.until, clip.phases()
-    still = phase != PHASES.index("load")
-    for frame in np.flatnonzero((phase == PHASES.index("release")) & (np.roll(phase, 1) != phase)):
-        still[frame : frame + SETTLES] = False
+    until = clip.until
     fitted = slice(0, until)
     noise = estimate(
-        clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, still[fitted], clip.recording.sigma[clip.kept]
+        clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, clip.quiet()[fitted], clip.recording.sigma[clip.kept]
     )
     if settings.noise == "independent":
         noise = replace(
