@@ -130,6 +130,7 @@ rule diagnosis:
         diagnosis="blind/{seed}/{case}/{way}/diagnosis.json",
         physics="blind/{seed}/{case}/{way}/physics.json",
         mismatch="blind/{seed}/{case}/{way}/mismatch.npz",
+        cloud="blind/{seed}/{case}/{way}/mismatch.ply",
     log:
         "logs/blind/{seed}/{case}/{way}/diagnosis.log",
     benchmark:
@@ -147,7 +148,7 @@ rule diagnosis:
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
         " --recording {params.recording} --diagnosis {output.diagnosis} --physics {output.physics}"
-        " --mismatch {output.mismatch}"
+        " --mismatch {output.mismatch} --cloud {output.cloud} --work blind/{wildcards.seed}/{wildcards.case}/{wildcards.way}/work"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 

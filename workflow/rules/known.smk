@@ -41,6 +41,7 @@ rule known_diagnosis:
         diagnosis="known/{known}/diagnosis.json",
         physics="known/{known}/physics.json",
         mismatch="known/{known}/mismatch.npz",
+        cloud="known/{known}/mismatch.ply",
     log:
         "logs/known/{known}/diagnosis.log",
     benchmark:
@@ -61,7 +62,7 @@ rule known_diagnosis:
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
         " --recording {params.recording} {params.base} --diagnosis {output.diagnosis} --physics {output.physics}"
-        " --mismatch {output.mismatch}"
+        " --mismatch {output.mismatch} --cloud {output.cloud} --work known/{wildcards.known}/work"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 

@@ -1,0 +1,22 @@
+"""Numbers learned on calibration recordings (seeds 901-903 of the blind generator), and used on all others.
+
+They were read off cases that conceal nothing, one effect or an effect outside the catalogue, none of which is ever
+reported as a result. docs/diagnosis.md tells how.
+"""
+
+THRESHOLD = 12.0
+"""log evidence of the best law below which nothing is called detectable."""
+TEMPERATURE = 12.0
+"""By which differences of log evidence are divided before they become probabilities: signatures are not exact."""
+MISFIT = 0.06
+"""Share of the explained chi square that signatures of the right law leave wrong."""
+EXPLAINED = 0.55
+"""Share of the explainable misfit that a law must explain to be named."""
+SECOND = 0.12
+"""Share of it that a second law must add."""
+ALIKE = 0.85
+"""|cos| of whitened signatures beyond which two laws are not told apart."""
+EXPLAINED_WELL = 0.9
+"""Share beyond which no second law is looked for."""
+SURE = 0.5
+"""Probability that a law must have to be named alone."""
