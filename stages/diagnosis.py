@@ -22,11 +22,13 @@ from surgisim.stage import Bytes, Source, stage
     settings=Diagnosing,
 )
 def main(recording, work, *, settings, progress):
-    from surgisim.diagnosis.files import cloud, memo_for
     from surgisim.diagnosis.diagnose import diagnose
+    from surgisim.diagnosis.files import cloud, memo_for
     from surgisim.recordings.folder import read_recording
 
-    found, physics, mismatch = diagnose(read_recording(recording), settings, progress, memo_for(recording, settings, work))
+    found, physics, mismatch = diagnose(
+        read_recording(recording), settings, progress, memo_for(recording, settings, work)
+    )
     return found, physics, mismatch, cloud(mismatch)
 
 

@@ -15,7 +15,7 @@ class Diagnosis(JsonArtifact):
     effects: list[dict[str, Any]]
     """Each with term, probability, place, time, parameters, runners_up, separating_experiment."""
     ranking: list[dict[str, Any]]
-    """Every law that was tried: term, place, log_evidence, probability, cos to the winner, held_out RMS [mm] or null."""
+    """Every law tried: term, place, log_evidence, probability, cos to the winner, held_out RMS [mm] or null."""
     detectable_above: dict[str, Any]
     """{"value", "unit"}: RMS size beyond which an effect would mostly have been seen; and "laws": law -> size."""
     missing_phases: list[str]

@@ -13,7 +13,7 @@ import numpy as np
 
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
-from surgisim.diagnosis.metric import metric
+from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Whitener
 from surgisim.diagnosis.tangent import Tangent, base_piola, tangent
 from surgisim.mpm.grip import Drive
@@ -26,6 +26,10 @@ START = np.array([np.log(3e3), 0.45, np.log(3e-3)])
 SPREAD = np.array([0.8, 0.03, 0.8])
 LOW, HIGH = np.array([np.log(5e2), 0.30, np.log(3e-4)]), np.array([np.log(5e4), 0.485, np.log(3e-2)])
 STEP = np.array([0.2, 0.01, 0.3])
+SCAN = (-1.0, -0.35, 0.3, 1.0)
+"""Where the descent may start, in logarithms of E and of eta / E away from START."""
+DESCENTS = 8
+"""Steps of it at most."""
 SAFETY = 0.8
 AFTER = 0.5
 """How long a short run goes on after the release [s]."""
@@ -57,44 +61,102 @@ def values_of(x: np.ndarray) -> Values:
 
 
 def fit_base(
-    clip: Clip, whiten: Whitener, nuisances: np.ndarray, memo: Memo, *, rounds: int = 1, inner_steps: int = 3,
-    say: Callable[[str], None] = lambda text: None, extra: np.ndarray | None = None,
+    clip: Clip, whiten: Whitener, nuisances: np.ndarray, memo: Memo, *, rounds: int = 1,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Base:  # fmt: skip
-    """Least squares over E, nu and eta.
-
-    nuisances: whitened at one standard deviation, (N, M), but for those that depend on the run. extra: what is added to the simulated tracks [m], (K, T_fit, 3).
-    """
+    """Least squares over E, nu and eta, given nuisances whitened at one standard deviation, (N, M)."""
     x, until = START.copy(), clip.until
     prepared = clip.prepared(TERMS)
     carry = prepared.simulator.carry(clip.rest)
     space = metric(nuisances)
-    target = clip.moved[:, :until] - (0 if extra is None else extra)
     for iteration in range(rounds + 1):
         last = iteration == rounds
         say(f"base, run {iteration + 1}: E {np.exp(x[0]):.0f} Pa, nu {x[1]:.3f}, eta {np.exp(x[0] + x[2]):.2f} Pa s")
         drive, run = simulate(prepared, clip, x, memo, clip.frames if last else until)
         simulated = carried(carry, run)
         near = tangent(prepared, values_of(x), drive, run, clip.rest, until)
-        slopes = np.zeros((3, *target.shape))
-        slopes[1] = _by_poisson(prepared, near, x)
-        begun, y, now = x.copy(), x.copy(), simulated[:, :until].copy()
-        for inner in range(1 if last else inner_steps):
-            slopes[[0, 2]] = _by_rates(clip, prepared, y, run, carry, now, memo, begun)
-            J = whiten(slopes).T
-            normal = space.gram(J, J) + np.diag(1 / SPREAD**2)
-            if last:
-                break
-            step = np.linalg.solve(normal, space.gram(J, whiten(target - now)[:, None])[:, 0] - (y - START) / SPREAD**2)
-            y_new = np.clip(y + np.clip(step, -1.2 * SPREAD, 1.2 * SPREAD), LOW, HIGH)
-            if inner + 1 < inner_steps:
-                now = simulated[:, :until] + (y_new[1] - x[1]) * slopes[1][:, :]
-                first, end = _window(clip)
-                seen = _short(clip, prepared, np.array([y_new[0], x[1], y_new[2]]), run, carry, first, end)
-                now[:, first + 1 : end + 1] = seen + (y_new[1] - x[1]) * slopes[1][:, first + 1 : end + 1]
-            y = y_new
-        x = y if not last else x
-    spread = np.sqrt(np.diag(np.linalg.inv(normal)))
+        around = _Around(clip, whiten, space, memo, prepared, carry, x, run, simulated[:, :until], _by_poisson(prepared, near, x))
+        if not last:
+            x = around.descend(around.start() if iteration == 0 else x, say)
+    slopes = around.slopes(x)
+    spread = np.sqrt(np.diag(np.linalg.inv(around.normal(slopes))))
     return Base(x, prepared, drive, run, simulated, near, slopes * SPREAD[:, None, None, None], spread)
+
+
+@dataclass(frozen=True)
+class _Around:
+    """Tracks near a run at `x`: nu moves them along its slope, E and eta by short runs from the run's own states."""
+
+    clip: Clip
+    whiten: Whitener
+    space: Metric
+    memo: Memo
+    prepared: Prepared
+    carry: object
+    x: np.ndarray
+    run: Run
+    simulated: np.ndarray
+    by_poisson: np.ndarray
+
+    def tracks(self, y: np.ndarray) -> np.ndarray:
+        """Displacement of the points [m], (K, T_fit, 3)."""
+        first, last = _window(self.clip)
+        rates = np.array([y[0], self.x[1], y[2]])
+        what = ["short", self.x.tolist(), rates.tolist(), first, last]
+        seen = self.memo(
+            what, lambda: {"seen": _short(self.clip, self.prepared, rates, self.run, self.carry, first, last)}
+        )["seen"]
+        result = self.simulated.copy()
+        result[:, first + 1 : last + 1] = seen
+        return result + (y[1] - self.x[1]) * self.by_poisson
+
+    def left(self, y: np.ndarray) -> np.ndarray:
+        """Whitened residual, (N,)."""
+        return self.whiten(self.clip.moved[:, : self.clip.until] - self.tracks(y))
+
+    def cost(self, y: np.ndarray, left: np.ndarray) -> float:
+        return float(self.space.gram(left[:, None], left[:, None])[0, 0] + (((y - START) / SPREAD) ** 2).sum())
+
+    def slopes(self, y: np.ndarray) -> np.ndarray:
+        """Derivative of the points' displacement by y [m], (3, K, T_fit, 3)."""
+        middle = self.tracks(y)
+        rates = {k: (self.tracks(y + STEP * np.eye(3)[k]) - middle) / STEP[k] for k in (0, 2)}
+        return np.stack([rates[0], self.by_poisson, rates[2]])
+
+    def normal(self, slopes: np.ndarray) -> np.ndarray:
+        J = self.whiten(slopes).T
+        return self.space.gram(J, J) + np.diag(1 / SPREAD**2)
+
+    def start(self) -> np.ndarray:
+        """The best of a few stiffnesses and viscosities: a ring-down misfits by whole periods."""
+        tries = [self.x + [e, 0.0, lag] for e in SCAN for lag in SCAN]
+        tries = [np.clip(y, LOW, HIGH) for y in tries]
+        return min(tries, key=lambda y: self.cost(y, self.left(y)))
+
+    def descend(self, y: np.ndarray, say: Callable[[str], None]) -> np.ndarray:
+        """Levenberg-Marquardt from y."""
+        left = self.left(y)
+        cost, damping = self.cost(y, left), 1e-2
+        for _ in range(DESCENTS):
+            say(f"base: E {np.exp(y[0]):.0f} Pa, nu {y[1]:.3f}, eta {np.exp(y[0] + y[2]):.2f} Pa s")
+            slopes = self.slopes(y)
+            normal = self.normal(slopes)
+            pull = self.space.gram(self.whiten(slopes).T, left[:, None])[:, 0] - (y - START) / SPREAD**2
+            for _ in range(4):
+                step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), pull)
+                there = np.clip(y + np.clip(step, -1.2 * SPREAD, 1.2 * SPREAD), LOW, HIGH)
+                left_there = self.left(there)
+                cost_there = self.cost(there, left_there)
+                if cost_there < cost:
+                    break
+                damping *= 8
+            else:
+                return y
+            done = cost - cost_there < 0.5
+            y, left, cost, damping = there, left_there, cost_there, max(damping / 4, 1e-4)
+            if done:
+                return y
+        return y
 
 
 def carried(carry, run: Run) -> np.ndarray:
@@ -126,22 +188,6 @@ def _by_poisson(prepared, near: Tangent, x) -> np.ndarray:
         F = near.gradient(frame)
         loads.append(near.of_stress((base_piola(prepared, values, F) - base_piola(prepared, more, F)) / 1e-4))
     return near.over_time(near.at_states(np.stack(loads)[:, None])[:, 0])
-
-
-def _by_rates(clip, prepared, x, run, carry, now, memo, begun) -> np.ndarray:
-    """The same by log E and log eta / E, (2, K, T_fit, 3), from short runs that begin in states of `run`."""
-    result, (first, last) = np.zeros((2, *now.shape)), _window(clip)
-    y = np.array([x[0], begun[1], x[2]])
-
-    def seen(k: int | None) -> np.ndarray:
-        shifted = y if k is None else y + STEP * np.eye(3)[k]
-        what = ["short", begun.tolist(), shifted.tolist(), first, last]
-        return memo(what, lambda: {"seen": _short(clip, prepared, shifted, run, carry, first, last)})["seen"]
-
-    middle = seen(None)
-    for n, k in enumerate((0, 2)):
-        result[n, :, first + 1 : last + 1] = (seen(k) - middle) / STEP[k]
-    return result
 
 
 def _short(clip, prepared, x, run, carry, first, last) -> np.ndarray:

@@ -12,6 +12,8 @@ MISFIT = 0.06
 """Share of the explained chi square that signatures of the right law leave wrong."""
 EXPLAINED = 0.55
 """Share of the explainable misfit that a law must explain to be named."""
+RIVAL = 0.7
+"""Share of the best law's gain beyond which the engine runs another law too."""
 SECOND = 0.12
 """Share of it that a second law must add."""
 ALIKE = 0.85

@@ -1,4 +1,4 @@
-"""A recording as the diagnosis sees it: displacements of points that the body carries, and which frames may be fitted."""
+"""A recording as the diagnosis sees it: points that the body carries, how they moved, which frames may be fitted."""
 
 from dataclasses import dataclass
 
@@ -114,8 +114,8 @@ def clip_of(recording: Recording, *, share: float = SHARE) -> Clip:
     kept = np.flatnonzero(usable)
     if len(kept) < 4:
         raise Problem(
-            f"recording {recording.name}: {len(kept)} of {len(rest)} points lie on the body, outside the grips, and are "
-            "seen often enough; at least 4 are needed to tell what was left out."
+            f"recording {recording.name}: {len(kept)} of {len(rest)} points lie on the body, outside the grips, and "
+            "are seen often enough; at least 4 are needed to tell what was left out."
         )
     if until < 8:
         raise Problem(

@@ -11,7 +11,7 @@ from surgisim.artifacts.physics import Physics
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, nuisance, verdict
 from surgisim.diagnosis.base import Base, fit_base
-from surgisim.diagnosis.candidates import blocks
+from surgisim.diagnosis.candidates import Parts, blocks, costly
 from surgisim.diagnosis.clip import PHASES, Clip, clip_of
 from surgisim.diagnosis.evidence import Finding, by_law, judge
 from surgisim.diagnosis.flexible import flexible
@@ -69,12 +69,16 @@ def diagnose(
     case = prepare_case(clip, settings, memo, progress)
     findings = search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.4 * s, 1, text))
     laws = by_law(findings)
-    ranked = sorted(laws, key=lambda term: -laws[term][0])
     bend = flexible(case.clip, case.whiten, case.space, case.z)
-    refits = []
-    detected = laws[ranked[0]][0] > threshold(laws, settings)
+    detected = max(entry[0] for entry in laws.values()) > threshold(laws, settings)
+    if detected and max(f.gain for f in findings) < calibration.EXPLAINED_WELL * bend.gain:
+        parts = costly(clip, case.base, memo)
+        findings += search(case, case.z, case.nulls, lambda s, text: progress(0.62, 1, text), parts)
+        laws = by_law(findings)
+    ranked, refits = sorted(laws, key=lambda term: -laws[term][0]), []
     if detected:
-        for n, term in enumerate(ranked[: settings.refine]):
+        rivals = [t for t in ranked if laws[t][2][0].gain > calibration.RIVAL * laws[ranked[0]][2][0].gain]
+        for n, term in enumerate(rivals[: settings.refine]):
             progress(0.65 + 0.2 * n / settings.refine, 1, f"the engine with {term}")
             refits.append(refit(case, laws[term][2][0], laws[term][0], case.z))
         refits.sort(key=lambda r: -r.log_evidence)
@@ -93,11 +97,19 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     for frame in np.flatnonzero((phase == PHASES.index("release")) & (np.roll(phase, 1) != phase)):
         still[frame : frame + SETTLES] = False
     fitted = slice(0, until)
-    noise = estimate(clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, still[fitted], clip.recording.sigma[clip.kept])
+    noise = estimate(
+        clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, still[fitted], clip.recording.sigma[clip.kept]
+    )
     if settings.noise == "independent":
-        noise = replace(noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0)
+        noise = replace(
+            noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0
+        )
     whiten = whitener(noise, clip.rest, clip.seen[:, fitted], settings.offsets)
-    wrong = whiten(nuisance.simulator(clip, until, settings.model_error)).T if settings.model_error else np.zeros((3 * until * len(clip.kept), 1))
+    wrong = (
+        whiten(nuisance.simulator(clip, until, settings.model_error)).T
+        if settings.model_error
+        else np.zeros((3 * until * len(clip.kept), 1))
+    )
     base = fit_base(clip, whiten, wrong, memo, say=lambda text: progress(0.1, 1, text))
     parts = [wrong, whiten(nuisance.camera(clip, base.simulated[:, fitted])).T, whiten(base.slopes).T]
     if settings.model_error and len(clip.motion.radius):
@@ -108,10 +120,10 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     return Case(clip, settings, noise, whiten, base, space, memo, z, nulls)
 
 
-def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress) -> list[Finding]:
-    """Every hypothesis against a whitened residual."""
+def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts | None = None) -> list[Finding]:
+    """Every hypothesis of `parts` (or of all that is cheap) against a whitened residual."""
     residuals = np.concatenate([z[:, None].astype(np.float32), nulls], 1)
-    parts, found, source = list(blocks(case.clip, case.base)), [], 0
+    parts, found, source = list(parts or blocks(case.clip, case.base)), [], 0
     for n, (name, make) in enumerate(parts):
         progress(n / len(parts), f"trying {name} ({n + 1} of {len(parts)})")
         for block in make():
@@ -145,9 +157,11 @@ def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: 
         white = case.whiten(change[:, :until])[:, None]
         G, b = float(case.space.gram(white, white)[0, 0]), float(case.space.gram(white, z[:, None])[0, 0])
         best = b / max(G, 1e-12)
-        mine = 2 * b - G
+        # Near its best strength a response may be scaled; far from it, only another run tells.
+        scale = float(np.clip(best, 0.7, 1.4))
+        mine = 2 * scale * b - scale**2 * G
         if mine > gain:
-            gain, response, kept = mine, change, amplitude.copy()
+            gain, response, kept = mine, scale * change, scale * amplitude
         if abs(best - 1) < 0.1 or best <= 0:
             break
         amplitude = amplitude * float(np.clip(best, 0.4, 2.5))
@@ -170,5 +184,3 @@ def another(case: Case, first: Refit, progress: Progress) -> tuple[Refit, float]
     if laws[best][0] < threshold(laws, case.settings):
         return None
     return refit(left, laws[best][2][0], laws[best][0], z), laws[best][0]
-
-

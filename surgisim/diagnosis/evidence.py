@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
-from surgisim.diagnosis.candidates import Block, Hypothesis
+from surgisim.diagnosis.form import Block
+from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.metric import Metric
 
 SIZES = (1.5e-4, 4e-4, 1e-3)

@@ -6,11 +6,13 @@ import numpy as np
 
 from surgisim.artifacts.motion import Motion
 from surgisim.diagnosis.base import Base
-from surgisim.diagnosis.candidates import ease, places
 from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.form import places
+from surgisim.diagnosis.hypothesis import ease
 from surgisim.diagnosis.laws import Law, respond
 from surgisim.diagnosis.memo import Memo
 from surgisim.mpm.simulator import Breakdown
+from surgisim.recordings.recording import Recording
 
 PULL, HOLD, REST = 0.6, 1.2, 0.8
 """How long a proposed pull takes, holds, and is watched after its release [s]."""
@@ -20,7 +22,9 @@ def separating(clip: Clip, base: Base, first: Law, second: Law, memo: Memo, name
     """The pull, of a few, under which the two laws differ most, in words."""
     best = None
     for text, motion in pulls(clip, rng):
-        trial = replace(clip, recording=replace(clip.recording, motion=motion), moved=np.zeros((len(clip.kept), motion.active.shape[1], 3)))
+        trial = replace(
+            clip, recording=_under(clip.recording, motion), moved=np.zeros((len(clip.kept), len(motion.active[0]), 3))
+        )
         try:
             seen = [respond(trial, base, replace(law, motion=None, begins=0.0), memo) for law in (first, second)]
         except Breakdown:
@@ -31,6 +35,14 @@ def separating(clip: Clip, base: Base, first: Law, second: Law, memo: Memo, name
     if best is None:
         return f"None of the pulls tried can be simulated with both {names[0]} and {names[1]}."
     return f"{best[1]}: {names[0]} and {names[1]} would then differ by {1e3 * best[0]:.2g} mm RMS."
+
+
+def _under(recording: Recording, motion: Motion) -> Recording:
+    """The recording's body under another motion; nothing is observed of it."""
+    seen = np.zeros((len(recording.points), motion.active.shape[1]), bool)
+    points = np.full((*seen.shape, 3), np.nan, np.float32)
+    place = recording.attached()
+    return replace(recording, motion=motion, points=points, visible=seen, place=place, split=None)
 
 
 def pulls(clip: Clip, rng: np.random.Generator) -> list[tuple[str, Motion]]:
@@ -52,6 +64,9 @@ def pulls(clip: Clip, rng: np.random.Generator) -> list[tuple[str, Motion]]:
             active = (time <= PULL + HOLD)[None]
             motion = Motion(center[None], np.array([radius]), path[None], active, np.ones(1), "given")
             at = ", ".join(f"{1e3 * c:.0f}" for c in center)
-            text = f"Grasp near ({at}) mm, pull {1e3 * length:.0f} mm {name} along ({', '.join(f'{c:.2f}' for c in way)}), hold {HOLD:g} s and release"
+            along = ", ".join(f"{c:.2f}" for c in way)
+            text = (
+                f"Grasp near ({at}) mm, pull {1e3 * length:.0f} mm {name} along ({along}), hold {HOLD:g} s and release"
+            )
             result.append((text, motion))
     return result

@@ -24,7 +24,9 @@ COLD, HOT = np.array([215, 205, 195]), np.array([190, 20, 30])
 def memo_for(recording: Path, settings: Diagnosing, folder: Path | None) -> Memo:
     """Finished runs of this recording, these settings and this code."""
     content = hashlib.sha256()
-    for path in sorted(p for p in Path(recording).iterdir() if p.is_file() and not p.name.startswith(("truth", "salt"))):
+    for path in sorted(
+        p for p in Path(recording).iterdir() if p.is_file() and not p.name.startswith(("truth", "salt"))
+    ):
         content.update(path.name.encode() + path.read_bytes())
     about = f"{content.hexdigest()} {settings.model_dump_json()} {code()}"
     return Memo(folder, about)
@@ -51,9 +53,14 @@ def carry_out(recording: Path, out: Path, sets: tuple[str, ...]) -> str:
     from surgisim.diagnosis.diagnose import diagnose
 
     settings = parse(Diagnosing, dict(map(_pair, sets)), "diagnose")
-    made = diagnose(read_recording(recording), settings, Progress("diagnosis"), memo_for(recording, settings, out / "work"))
+    made = diagnose(
+        read_recording(recording), settings, Progress("diagnosis"), memo_for(recording, settings, out / "work")
+    )
     header = {"producer": "diagnosis", "settings": settings.model_dump(mode="json"), "code": code()}
-    files = {out / f"{name}{a.SUFFIX}": encoded(a, **header) for name, a in zip(("diagnosis", "physics", "mismatch"), made, strict=True)}
+    files = {
+        out / f"{name}{a.SUFFIX}": encoded(a, **header)
+        for name, a in zip(("diagnosis", "physics", "mismatch"), made, strict=True)
+    }
     save_bytes(files | {out / "mismatch.ply": cloud(made[2])})
     return f"{made[0].verdict}: {made[0].words}"
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from surgisim.artifacts.motion import Motion
 from surgisim.diagnosis.base import SAFETY, Base, carried
-from surgisim.diagnosis.candidates import RISE, Hypothesis
 from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.hypothesis import RISE, Hypothesis
 from surgisim.diagnosis.memo import Memo
 from surgisim.mpm.setup import Values
 from surgisim.mpm.simulator import Run
@@ -66,6 +66,10 @@ def law_of(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> Law:
         return Law({term: {"yield_strain": h.about["yield_strain"], "share": min(a, 1.0)}}, {})
     if term == "damage":
         return Law({term: {"onset": h.about["onset"], "rate": a}}, {})
+    if term == "sliding_base":
+        yaw, pitch = angles(clip.normal)
+        own = {"share": 1.0, "stiffness": h.about["stiffness"], "yaw": yaw, "pitch": pitch}
+        return Law({term: {**own, "cap": h.about["cap"] / max(a, 1e-3)}}, {})
     yaw, pitch = angles(h.about["axis"])
     period, slowness = h.about["period"], h.about["period"] / h.about["wavelength"]
     onset = -h.about["phase"] / (2 * np.pi) * period - 4 * period
@@ -84,7 +88,7 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
         theta = prepared.theta(values, law.places)
         rows = prepared.stiffest(theta)
         per_frame = max(prepared.per_frame_of(rows, clip.fps, SAFETY), base.drive.per_frame)
-        drive = prepared.drive(motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames)
+        drive = prepared.drive(motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames, places=law.places)
         first = int(law.begins * clip.fps)
         begin = None if first == 0 else base.run.state(first)[:2]
         run = prepared.simulator.run(theta, drive, begin=begin, first=first, last=frames - 1)
@@ -148,7 +152,21 @@ def _slipped(clip: Clip, h: Hypothesis, amplitude: float) -> Motion:
     return replace(motion, position=position)
 
 
-def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Clip) -> dict[str, dict]:
+FORCES = (
+    "hidden_contact",
+    "added_mass",
+    "tether",
+    "gravity",
+    "stiffening",
+    "fibre",
+    "pretension",
+    "relaxation",
+    "active_contraction",
+    "sliding_base",
+)
+
+
+def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Clip, base: Base) -> dict[str, dict]:
     """Parameters with 90 % intervals and units, as diagnosis.json has them."""
     law = law_of(h, amplitude, clip)
     size = max(float(np.linalg.norm(amplitude)), 1e-30)
@@ -157,8 +175,10 @@ def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Cl
     scaling = {
         "hidden_contact": "force", "added_mass": "mass", "tether": "stiffness", "respiration": "amplitude",
         "stiffening": "k", "fibre": "k1", "pretension": "along", "relaxation": "G", "plastic_set": "share",
-        "damage": "rate", "active_contraction": "tension",
+        "damage": "rate", "active_contraction": "tension", "sliding_base": "cap",
     }  # fmt: skip
+    # What pushes, pulls or resists is told only over the tissue's own stiffness.
+    by_stiffness = 1.645 * float(base.spread[0])
     for name, numbers in law.values.items():
         if name == "hidden_contact" and h.term == "added_mass":
             continue
@@ -166,12 +186,19 @@ def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Cl
         for key, value in numbers.items():
             low = high = value
             if name == "gravity":
-                low, high = value - 1.645 * spread["xyz".index(key)], value + 1.645 * spread["xyz".index(key)]
+                reach = np.hypot(1.645 * spread["xyz".index(key)], by_stiffness * abs(value))
+                low, high = value - reach, value + reach
             elif scaling.get(h.term) == key:
-                low, high = value * (1 - share), value * (1 + share)
+                wide = np.hypot(np.log1p(share), by_stiffness if h.term in FORCES else 0.0)
+                low, high = value * np.exp(-wide), value * np.exp(wide)
             elif key == "s":
                 low, high = value ** (1 - share), value ** (1 + share)
-            result[key] = {"value": float(value), "low": float(min(low, high)), "high": float(max(low, high)), "unit": params[key].unit}
+            result[key] = {
+                "value": float(value),
+                "low": float(min(low, high)),
+                "high": float(max(low, high)),
+                "unit": params[key].unit,
+            }
     if h.term == "tool_slip":
         a = float(amplitude[0])
         result["slip"] = {"value": a, "low": a * (1 - share), "high": a * (1 + share), "unit": "1"}

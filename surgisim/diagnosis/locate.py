@@ -72,5 +72,7 @@ def of_places(clip: Clip, findings: list[Finding], rest: np.ndarray) -> np.ndarr
     """Probability of a local law's place, spread over the particles, at most 1, (P,)."""
     logs = np.array([f.log_evidence for f in findings])
     share = np.exp(logs - logs.max())
-    heat = sum(w * f.hypothesis.place.weight(rest) for w, f in zip(share / share.sum(), findings, strict=True) if w > 1e-3)
+    heat = sum(
+        w * f.hypothesis.place.weight(rest) for w, f in zip(share / share.sum(), findings, strict=True) if w > 1e-3
+    )
     return heat / max(heat.max(), 1e-30)

@@ -129,7 +129,14 @@ def estimate(moved: np.ndarray, seen: np.ndarray, rest: np.ndarray, still: np.nd
             continue
         line = np.vander(np.linspace(-1, 1, len(frames)), 2)
         basis = np.linalg.qr(line, mode="complete")[0][:, 2:]
-        data.append((rest[mine], frames, basis, np.einsum("ts,ktc->ksc", basis, moved[np.ix_(mine, frames)] / level[mine, None, None])))
+        data.append(
+            (
+                rest[mine],
+                frames,
+                basis,
+                np.einsum("ts,ktc->ksc", basis, moved[np.ix_(mine, frames)] / level[mine, None, None]),
+            )
+        )
     if not data:
         return Noise(np.maximum(level, 1e-9), 0.2, 0.006, 0.02, 0.02, 0.7, 0.3, 0.75, 0.45)
 
@@ -138,7 +145,14 @@ def estimate(moved: np.ndarray, seen: np.ndarray, rest: np.ndarray, still: np.nd
         total = 0.5 * float(((x - START) ** 2 / SPREAD**2).sum())
         for where, frames, basis, z in data:
             values, axes = np.linalg.eigh(_spatial(where, part["shared"], part["length"], part["rigid"], part["tilt"]))
-            cov = _temporal(np.arange(len(frames)), np.maximum(values, 0), part["keep_shared"], part["lasting"], part["keep"], part["white"])
+            cov = _temporal(
+                np.arange(len(frames)),
+                np.maximum(values, 0),
+                part["keep_shared"],
+                part["lasting"],
+                part["keep"],
+                part["white"],
+            )
             cov = basis.T @ cov @ basis
             factor = np.linalg.cholesky(cov)
             mode = np.einsum("km,ksc->msc", axes, z)
@@ -146,7 +160,17 @@ def estimate(moved: np.ndarray, seen: np.ndarray, rest: np.ndarray, still: np.nd
             total += 0.5 * float((white**2).sum()) + 3 * float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum())
         return total
 
-    found = minimize(cost, START, method="Nelder-Mead", options={"maxfev": 420, "xatol": 0.03, "fatol": 0.5, "initial_simplex": START + np.vstack([np.zeros(len(START)), 0.5 * np.eye(len(START))])})
+    found = minimize(
+        cost,
+        START,
+        method="Nelder-Mead",
+        options={
+            "maxfev": 420,
+            "xatol": 0.03,
+            "fatol": 0.5,
+            "initial_simplex": START + np.vstack([np.zeros(len(START)), 0.5 * np.eye(len(START))]),
+        },
+    )
     return Noise(level, **_unpacked(found.x))
 
 
@@ -198,5 +222,3 @@ def _stretches(still: np.ndarray) -> list[np.ndarray]:
     if not parts:
         parts = np.array_split(np.arange(len(still)), max(1, len(still) // STRETCH))
     return [q for p in parts for q in np.array_split(p, max(1, len(p) // (2 * STRETCH)))]
-
-

@@ -99,9 +99,7 @@ def tangent(prepared: Prepared, values: Values, drive: Drive, run: Run, points: 
     count, links = index.shape
     nodes = len(simulator.place)
     p, k = np.repeat(np.arange(count), links), index.ravel()
-    value = sparse.csr_matrix(
-        (np.repeat(link[..., 0].ravel(), 3), (_fan(3 * p), _fan(3 * k))), (3 * count, 3 * nodes)
-    )
+    value = sparse.csr_matrix((np.repeat(link[..., 0].ravel(), 3), (_fan(3 * p), _fan(3 * k))), (3 * count, 3 * nodes))
     rows = (9 * p[:, None, None] + 3 * np.arange(3)[None, :, None] + np.arange(3)[None, None, :]).ravel()
     cols = np.broadcast_to(3 * k[:, None, None] + np.arange(3)[None, :, None], (len(p), 3, 3)).ravel()
     data = np.broadcast_to(link[..., 1:].reshape(-1, 1, 3), (len(p), 3, 3)).ravel()

@@ -6,14 +6,14 @@ from surgisim.artifacts.diagnosis import Diagnosis
 from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.diagnosis import calibration, words
-from surgisim.diagnosis.candidates import Hypothesis
 from surgisim.diagnosis.clip import PHASES
+from surgisim.diagnosis.errors import errors, residual, rms
 from surgisim.diagnosis.experiment import separating
-from surgisim.diagnosis.flexible import smooth_part
+from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import described, law_of, respond
 from surgisim.diagnosis.locate import cause, of_places, symptom
+from surgisim.diagnosis.model import base_numbers, physics
 from surgisim.mpm.simulator import Breakdown
-from surgisim.physics.catalogue import choose
 
 RUNNERS = 4
 
@@ -47,10 +47,10 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
             for effect in effects:
                 effect["probability"] = min(effect["probability"], explained / 2)
     placebo = _placebo(case, refits, laws, rng) if detected else base.simulated
-    fit, held_out = _errors(case, after, placebo)
-    z, reach = symptom(clip, case.noise, _residual(case, base.simulated, False), rng)
+    fit, held_out = errors(case, after, placebo)
+    z, reach = symptom(clip, case.noise, residual(case, base.simulated, False), rng)
     freed = case.z - case.space.explained(case.z)
-    cleared = case.nulls - case.space.columns @ np.linalg.lstsq(_eye(case), case.space.seen_through(case.nulls), rcond=None)[0]
+    cleared = case.nulls - case.space.explained(case.nulls)
     heat, when = cause(base, case.whiten, freed, cleared)
     heat = heat / max(heat.max(), 1e-30)
     if effects and refits[0].finding.hypothesis.place is not None and refits[0].finding.hypothesis.place.normal is None:
@@ -73,8 +73,9 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         held_out=held_out,
         unexplained_fraction=float(np.clip(1 - explained, 0, 1)) if detected else 0.0,
         words=said,
-        base=_base(base),
-        noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(case.noise).items()} | {"sigma": case.noise.sigma, "unit": "m"},
+        base=base_numbers(base),
+        noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(case.noise).items()}
+        | {"sigma": case.noise.sigma, "unit": "m"},
         global_test={
             "log_evidence": float(laws[ranked[0]][0]),
             "nulls": np.round(np.max([n for _, n, _ in laws.values()], 0), 3).tolist(),
@@ -83,8 +84,8 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
     )
     mismatch = Mismatch(
         points=clip.rest,
-        residual_before=_residual(case, base.simulated),
-        residual_after=_residual(case, after if verdict != "unexplained" else base.simulated),
+        residual_before=residual(case, base.simulated),
+        residual_after=residual(case, after if verdict != "unexplained" else base.simulated),
         z=z,
         significant=reach,
         particles=base.prepared.simulator.rest,
@@ -135,14 +136,28 @@ def _effect(case, r, chances, laws, refits, number) -> dict:
     center, extent = place_of(laws[r.term][2]) if h.place is not None else (None, None)
     if r.term == "tool_slip":
         center, extent = np.array(h.place.center), h.place.extent
-    runners = [{"term": t, "probability": chances[t]} for t in sorted(chances, key=lambda t: -chances[t]) if t != r.term]
+    runners = [
+        {"term": t, "probability": chances[t]} for t in sorted(chances, key=lambda t: -chances[t]) if t != r.term
+    ]
     local = h.place is not None and h.place.normal is None
     return {
         "term": r.term,
-        "probability": chances[r.term] if number == 0 else float(1 / (1 + np.exp(-(r.log_evidence - calibration.THRESHOLD) / (calibration.TEMPERATURE + calibration.MISFIT * r.gain)))),
-        "place": {"center": [float(c) for c in center], "extent": float(extent), "unit": "m"} if local else "everywhere",
+        "probability": chances[r.term]
+        if number == 0
+        else float(
+            1
+            / (
+                1
+                + np.exp(
+                    -(r.log_evidence - calibration.THRESHOLD) / (calibration.TEMPERATURE + calibration.MISFIT * r.gain)
+                )
+            )
+        ),
+        "place": {"center": [float(c) for c in center], "extent": float(extent), "unit": "m"}
+        if local
+        else "everywhere",
         "time": {"onset": None if h.onset is None else float(h.onset), "end": None if h.end is None else float(h.end)},
-        "parameters": described(h, r.amplitude, r.finding.spread, case.clip),
+        "parameters": described(h, r.amplitude, r.finding.spread, case.clip, case.base),
         "runners_up": runners[:RUNNERS],
         "separating_experiment": "",
         "log_evidence": float(r.log_evidence),
@@ -151,7 +166,7 @@ def _effect(case, r, chances, laws, refits, number) -> dict:
 
 
 def place_of(findings) -> tuple[np.ndarray, float]:
-    """Mean centre [m] of the places near the best, by evidence, and the radius at which the law has fallen to a half."""
+    """Mean centre [m] of the places near the best, by evidence, and the radius at which the law is down to a half."""
     best = findings[0].hypothesis.place
     logs = np.array([f.log_evidence for f in findings])
     centers = np.array([f.hypothesis.place.center for f in findings])
@@ -178,11 +193,13 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
         r = run.get(term)
         held = None
         if r is not None and case.clip.frames > case.clip.until:
-            held = _rms(case, case.base.simulated + r.response)[1]
+            held = rms(case, case.base.simulated + r.response)[1]
         result.append(
             {
                 "term": term,
-                "place": "everywhere" if place is None else {"center": [float(c) for c in place.center], "extent": float(place.extent), "unit": "m"},
+                "place": "everywhere"
+                if place is None
+                else {"center": [float(c) for c in place.center], "extent": float(place.extent), "unit": "m"},
                 "log_evidence": float(laws[term][0] if r is None else r.log_evidence),
                 "probability": chances[term],
                 "gain": float(f.gain if r is None else r.gain),
@@ -195,66 +212,25 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
     return result
 
 
-def _residual(case, simulated, nan: bool = True) -> np.ndarray:
-    """Recording less prediction less each point's own constant [m], (K, T, 3)."""
-    clip, until = case.clip, case.clip.until
-    left = np.where(clip.seen[..., None], clip.moved - simulated, 0.0)
-    if case.settings.offsets:
-        count = np.maximum(clip.seen[:, :until].sum(1), 1)
-        left = left - (left[:, :until].sum(1) / count[:, None])[:, None]
-    return np.where(clip.seen[..., None], left, np.nan if nan else 0.0)
-
-
-def _rms(case, simulated) -> tuple[float, float | None]:
-    """On fitted frames and on those held out [mm]."""
-    left, until = _residual(case, simulated), case.clip.until
-    square = (left**2).sum(-1)
-    fitted = 1e3 * float(np.sqrt(np.nanmean(square[:, :until])))
-    if case.clip.frames == until or not case.clip.seen[:, until:].any():
-        return fitted, None
-    return fitted, 1e3 * float(np.sqrt(np.nanmean(square[:, until:])))
-
-
-def _errors(case, after, placebo) -> tuple[dict, dict]:
-    clip, until = case.clip, case.clip.until
-    floor = 1e3 * np.sqrt(3) * case.noise.sigma
-    rows = {name: _rms(case, s) for name, s in (("before", case.base.simulated), ("after", after), ("placebo", placebo))}
-    left = _residual(case, case.base.simulated, False)
-    parts = []
-    for span in (slice(0, until), slice(until, clip.frames)):
-        seen = clip.seen[:, span]
-        if not seen.any():
-            parts.append(None)
-            continue
-        smooth = smooth_part(clip, left[:, span], seen)
-        parts.append(1e3 * float(np.sqrt(((left[:, span] - smooth)[seen] ** 2).sum(-1).mean())))
-    result = []
-    for k in (0, 1):
-        result.append({"noise_floor": float(floor), **{n: r[k] for n, r in rows.items()}, "flexible": parts[k], "unit": "mm"})
-    low, high = _bootstrap(case, after)
-    result[1]["gain_low"], result[1]["gain_high"] = low, high
-    return result[0], result[1]
-
-
-def _bootstrap(case, after, draws: int = 200) -> tuple[float | None, float | None]:
-    """90 % interval of what the law takes off the held-out mean square [mm^2], points drawn again."""
-    clip, until = case.clip, case.clip.until
-    if clip.frames == until or not clip.seen[:, until:].any():
-        return None, None
-    square = [(_residual(case, s, False)[:, until:] ** 2).sum((1, 2)) for s in (case.base.simulated, after)]
-    count = clip.seen[:, until:].sum(1)
-    rng = np.random.default_rng([case.settings.seed, 2])
-    chosen = rng.integers(0, len(count), (draws, len(count)))
-    gains = 1e6 * (square[0] - square[1])[chosen].sum(1) / np.maximum(count[chosen].sum(1), 1)
-    return float(np.quantile(gains, 0.05)), float(np.quantile(gains, 0.95))
-
-
 def _placebo(case, refits, laws, rng) -> np.ndarray:
     """The same law at a wrong place, or a wrong law, with its strength fitted all the same."""
     first = refits[0].finding.hypothesis
     mine = laws[refits[0].term][2]
-    far = [f for f in mine if f.hypothesis.place is not None and np.linalg.norm(np.subtract(f.hypothesis.place.center, first.place.center)) > 0.012] if first.place is not None else []
-    others = far or [laws[t][2][0] for t in sorted(laws) if t not in {r.term for r in refits[:2]} and laws[t][2][0].hypothesis.mix.shape[1] <= 3]
+    far = (
+        [
+            f
+            for f in mine
+            if f.hypothesis.place is not None
+            and np.linalg.norm(np.subtract(f.hypothesis.place.center, first.place.center)) > 0.012
+        ]
+        if first.place is not None
+        else []
+    )
+    others = far or [
+        laws[t][2][0]
+        for t in sorted(laws)
+        if t not in {r.term for r in refits[:2]} and laws[t][2][0].hypothesis.mix.shape[1] <= 3
+    ]
     if not others:
         return case.base.simulated
     chosen = others[int(rng.integers(len(others)))]
@@ -262,39 +238,6 @@ def _placebo(case, refits, laws, rng) -> np.ndarray:
         return respond(case.clip, case.base, law_of(chosen.hypothesis, chosen.amplitude, case.clip), case.memo)
     except Breakdown:
         return case.base.simulated
-
-
-def _base(base) -> dict:
-    E, nu, lag = float(np.exp(base.x[0])), float(base.x[1]), float(np.exp(base.x[2]))
-    s = 1.645 * base.spread
-    return {
-        "E": {"value": E, "low": E * float(np.exp(-s[0])), "high": E * float(np.exp(s[0])), "unit": "Pa"},
-        "nu": {"value": nu, "low": nu - float(s[1]), "high": nu + float(s[1]), "unit": "1"},
-        "eta": {"value": E * lag, "low": E * lag * float(np.exp(-s[2])), "high": E * lag * float(np.exp(s[2])), "unit": "Pa s"},
-    }
-
-
-def physics(case, refits) -> Physics:
-    """The base's laws, and the named one, with the grid and the step they were fitted on."""
-    clip, base = case.clip, case.base
-    values, places, known = dict(base.values), {}, _base(base)
-    if refits:
-        law = law_of(refits[0].finding.hypothesis, refits[0].amplitude, clip)
-        values |= law.values
-        places = {n: {"center": [float(c) for c in p.center], "extent": float(p.extent), "normal": None if p.normal is None else [float(c) for c in p.normal]} for n, p in law.places.items()}
-    terms = {
-        name: {key: {"value": float(value), "unit": term.params[key].unit} | {k: known[key][k] for k in ("low", "high") if name in base.values and key in known} for key, value in values[name].items()}
-        for name, term in choose(values).items()
-    }
-    return Physics(
-        terms=terms, density=float(clip.density), gravity=[0.0, 0.0, 0.0],
-        grid={"spacing": float(clip.body.spacing), "step": float(base.drive.step)}, places=places,
-    )  # fmt: skip
-
-
-def _eye(case) -> np.ndarray:
-    U = case.space.columns
-    return np.eye(U.shape[1]) + (U.T @ U).astype(float)
 
 
 def _words(case, verdict, refits, effects, explained, laws, z) -> str:
@@ -309,5 +252,3 @@ def _words(case, verdict, refits, effects, explained, laws, z) -> str:
     if verdict == "equivalence class":
         said += f" {effects[0]['runners_up'][0]['term']} would look nearly the same."
     return said
-
-

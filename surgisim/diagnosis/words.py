@@ -1,20 +1,20 @@
 """Two plain sentences for a verdict."""
 
-from surgisim.diagnosis.candidates import Hypothesis
+from surgisim.diagnosis.hypothesis import Hypothesis
 
 SAYS = {
     "hidden_contact": ("something unseen pushes the tissue {where} from {onset} to {end}", "a push there ({amount})"),
-    "added_mass": ("the tissue sags {where} from {onset} on, as if something had been laid on it", "a weight there ({amount})"),
+    "added_mass": ("the tissue sags {where} from {onset} on, as under a load", "a weight there ({amount})"),
     "tether": ("the tissue {where} is held back once it has moved, as by an adhesion", "a band there ({amount})"),
-    "gravity": ("all tissue shifts one way from {onset} on, as if the table were tilted", "that change of weight ({amount})"),
+    "gravity": ("all tissue shifts one way from {onset} on, as on a tilted table", "that change of weight ({amount})"),
     "respiration": ("the base moves to and fro, touched or not, as with breathing", "a moving base ({amount})"),
     "tool_slip": ("the tissue follows the instrument less and less from {onset} on", "a grip that slips ({amount})"),
-    "stiff_inclusion": ("the tissue {where} strains {less} than its surroundings", "a lump of other stiffness there ({amount})"),
-    "base_layer": ("the deep tissue strains {less} than what lies above it", "a layer of other stiffness below ({amount})"),
+    "stiff_inclusion": ("the tissue {where} strains {less} than around it", "a lump of another stiffness ({amount})"),
+    "base_layer": ("the deep tissue strains {less} than what lies above it", "a layer of another stiffness ({amount})"),
     "stiffening": ("the tissue resists the more the further it is strained", "strain stiffening ({amount})"),
     "fibre": ("the tissue resists being stretched along one direction", "strands in that direction ({amount})"),
     "pretension": ("the tissue resists bending and lifting as something taut does", "a tension at rest ({amount})"),
-    "relaxation": ("the tissue gives way while it is held, and creeps back after the release", "a fading part of its stiffness ({amount})"),
+    "relaxation": ("tissue gives way while held and creeps back after the release", "stiffness that fades ({amount})"),
     "plastic_set": ("the tissue does not come back all the way after the release", "a lasting set ({amount})"),
     "damage": ("the tissue is softer after it has been strained than before", "damage ({amount})"),
     "active_contraction": ("the tissue contracts by itself, in waves", "muscle that pulls ({amount})"),
@@ -27,7 +27,11 @@ def sentence(h: Hypothesis, parameters: dict[str, dict], gained: float, size: fl
     seen, law = SAYS[h.term]
     where = "" if h.place is None else f"near ({', '.join(f'{1e3 * c:.0f}' for c in h.place.center)}) mm"
     first = next(iter(parameters.items()), None)
-    amount = "" if first is None else f"{first[0]} = {first[1]['value']:.3g} {first[1]['unit']}, {first[1]['low']:.3g} to {first[1]['high']:.3g}"
+    amount = (
+        ""
+        if first is None
+        else f"{first[0]} = {first[1]['value']:.3g} {first[1]['unit']}, {first[1]['low']:.3g} to {first[1]['high']:.3g}"
+    )
     softer = "s" in parameters and parameters["s"]["value"] < 1
     said = seen.format(
         where=where, onset=_moment(h.onset), end=_moment(h.end), less="more" if softer else "less",
@@ -49,7 +53,8 @@ def unexplained(best: str, left: float, when: str, where: list[float]) -> str:
     at = ", ".join(f"{1e3 * c:.0f}" for c in where)
     return (
         f"The recording departs from its simulation, most of all near ({at}) mm {when}, and no law tried explains it: "
-        f"{best} comes nearest and leaves {100 * left:.0f} % of it. What is missing is not in the catalogue, or more than one thing."
+        f"{best} comes nearest and leaves {100 * left:.0f} % of it. "
+        "What is missing is not in the catalogue, or more than one thing."
     )
 
 

@@ -47,6 +47,22 @@ def rasterise(
     return image[..., :3], image[..., 3], alpha, _weight(*attributes, camera, near)
 
 
+def draw_covariances(
+    mean: torch.Tensor, covariance: torch.Tensor, opacity: torch.Tensor, color: torch.Tensor, camera: Camera
+) -> torch.Tensor:
+    """(H, W, 3) of Gaussians (G, 3) [m] with covariances (G, 3, 3) [m^2]; all float32 on the CUDA device."""
+    from gsplat import rasterization
+
+    lens = mean.new_tensor(camera.matrix)
+    lens[:2, 2] += 0.5
+    with torch.no_grad():
+        image, _, _ = rasterization(
+            mean, None, None, opacity, color, torch.eye(4, device=mean.device)[None], lens[None], camera.width,
+            camera.height, eps2d=LOW_PASS, packed=False, covars=covariance,
+        )  # fmt: skip
+    return image[0]
+
+
 def lacking() -> str:
     """What the engine misses on this machine, in words; empty when it can run."""
     if not torch.cuda.is_available():

@@ -20,6 +20,8 @@ from surgisim.mpm.grid import Grid
 
 SOLID = 0.02
 """Share of the largest nodal mass above which a node moves by itself."""
+LEAST = 0.01
+"""Share that must be left to it once others hang on it; a lighter one would ask for tiny steps."""
 PASSES = 4
 """Rings of nodes around the body that are carried along."""
 
@@ -30,15 +32,25 @@ def extension(grid: Grid, mass: np.ndarray, cut: Cut | None) -> tuple[np.ndarray
     mass [kg], (N,), or (2 N,) once cut: the second half are the copies seen from across the cut.
     """
     solid = mass > SOLID * mass.max()
+    while True:
+        place, rule = _followed(grid, solid, cut)
+        light = rule.T @ mass < LEAST * mass.max()
+        if not light.any():
+            return place, rule
+        solid[place[light]] = False
+
+
+def _followed(grid: Grid, solid: np.ndarray, cut: Cut | None) -> tuple[np.ndarray, sparse.csr_matrix]:
     place = np.flatnonzero(solid)
-    rule = sparse.csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), (len(mass), len(place)))
+    size = len(solid)
+    rule = sparse.csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), (size, len(place)))
     known = solid.copy()
     touched = solid.reshape(-1, *grid.shape).any(0)
-    near = np.tile(binary_dilation(touched, np.ones((3, 3, 3))).ravel(), len(mass) // grid.count)
-    hops = [_neighbours(grid, len(mass), axis, sign, cut) for axis in range(3) for sign in (1, -1)]
+    near = np.tile(binary_dilation(touched, np.ones((3, 3, 3))).ravel(), size // grid.count)
+    hops = [_neighbours(grid, size, axis, sign, cut) for axis in range(3) for sign in (1, -1)]
     for _ in range(PASSES):
         total = sparse.csr_matrix(rule.shape)
-        votes = np.zeros(len(mass))
+        votes = np.zeros(size)
         # Straight lines first; a body one node thick has none, and is followed as a whole.
         for straight in (True, False):
             for first in hops:
@@ -49,7 +61,7 @@ def extension(grid: Grid, mass: np.ndarray, cut: Cut | None) -> tuple[np.ndarray
                 if not len(rows):
                     continue
                 value = 2 * rule[first[rows]] - rule[second[rows]] if straight else rule[first[rows]]
-                lift = sparse.csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), (len(mass), len(rows)))
+                lift = sparse.csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), (size, len(rows)))
                 total = total + lift @ value
                 if straight:
                     votes[rows] += 1

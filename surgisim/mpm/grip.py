@@ -16,6 +16,10 @@ manipulation). Shear, because tissue that cannot be squeezed flows around a grip
 that would drain every wave that arrives there."""
 SHARP_ANCHOR = 90.0
 """The same where the displacement may bend at a grip's skin (kink.py), which leaves less to make up for."""
+BASE = 10.0
+"""Least spring of the held base, in units of (pressure wave speed / spacing)^2 per unit of inertia of what it holds:
+what the stable step has room for (stable.py). Tissue that can hardly be squeezed presses on its base far harder than it
+shears it; a base that gives way under that makes it look as if it could be squeezed."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +29,7 @@ class Drive:
     member: np.ndarray
     """Bit a is set where anchor a holds the particle, (P,) int32."""
     share: np.ndarray
-    """Share of the particle's volume that is held, (P,)."""
+    """Share of the particle's volume that is held, times how much stiffer than the body's tissue it is, (P,)."""
     path: np.ndarray
     """Displacement of each anchor at every step and after the last [m], (1 + J, S + 1, 3)."""
     hold: np.ndarray

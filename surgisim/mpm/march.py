@@ -4,15 +4,46 @@ import threading
 
 import warp as wp
 
+GRAPH = 64
+"""Steps that a CUDA graph holds at most: enough that starting it costs nothing."""
+
+
 Phases = list[list[wp.Launch]]
 """Phases in order; the launches of one phase do not touch each other's sums."""
 
 
-def march(phases: Phases, steps: int) -> None:
-    """Launch every phase `steps` times over.
+class March:
+    """The phases of a step."""
 
-    A second launch of a phase runs on a thread of its own: a launch on the CPU releases the interpreter's lock.
-    """
+    def __init__(self, phases: Phases, device: str) -> None:
+        self.phases, self.device = phases, device
+        self._graphs: dict[int, wp.Graph] | None = {} if wp.get_device(device).is_cuda else None
+
+    def march(self, steps: int) -> None:
+        """Launch every phase `steps` times over."""
+        if self._graphs is None:
+            _launched(self.phases, steps)
+            return
+        for length, times in ((GRAPH, steps // GRAPH), (steps % GRAPH, 1)):
+            if length and times:
+                graph = self._graph(length)
+                for _ in range(times):
+                    wp.capture_launch(graph)
+
+    def _graph(self, steps: int) -> wp.Graph:
+        """A CUDA graph of that many steps: the clock is on the device, so that it serves wherever it begins."""
+        if steps not in self._graphs:
+            with wp.ScopedCapture(self.device, force_module_load=False) as capture:
+                for _ in range(steps):
+                    for phase in self.phases:
+                        for launch in phase:
+                            launch.launch()
+            self._graphs[steps] = capture.graph
+        return self._graphs[steps]
+
+
+def _launched(phases: Phases, steps: int) -> None:
+    """On a CPU: a second launch of a phase runs on a thread of its own, as a launch releases the interpreter's lock."""
     crew = [_Hand() for _ in range(max(map(len, phases)) - 1)]
     try:
         for _ in range(steps):

@@ -3,8 +3,11 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import eigsh
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.material import Material
@@ -12,10 +15,10 @@ from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.physics import Physics
 from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
-from surgisim.mpm.grip import ANCHOR, SHARP_ANCHOR, Drive, drive
+from surgisim.mpm.grip import ANCHOR, BASE, SHARP_ANCHOR, Drive, drive
 from surgisim.mpm.kink import Ball
 from surgisim.mpm.simulator import Simulator
-from surgisim.mpm.stable import check_step, largest_step, shear_speed
+from surgisim.mpm.stable import check_speed, check_step, largest_step, shear_speed, wave_speed
 from surgisim.mpm.updated import Updated
 from surgisim.physics.catalogue import Numbers, Term, choose, columns, defaults
 from surgisim.physics.place import Place, rows
@@ -71,8 +74,9 @@ class Prepared:
         frames: int | None = None,
         held: np.ndarray | None = None,
         grip: float = 1.0,
+        places: Mapping[str, Place] | None = None,
     ) -> Drive:
-        """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values`.
+        """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values` at `places`.
 
         A grip smaller than a cell is widened to one: the grid cannot carry a smaller ball along, and would let
         the tissue slip out of it.
@@ -80,10 +84,11 @@ class Prepared:
         spacing = self.simulator.grid.spacing
         laws = choose(self.terms)
         base = {n: t.row(values[n]) for n, t in laws.items() if t.energy is not None}
-        rate = shear_speed({n: laws[n] for n in base}, base, self.density) / spacing
+        alone = {n: laws[n] for n in base}
+        shear, pressure = (of(alone, base, self.density) / spacing for of in (shear_speed, wave_speed))
         motion = replace(motion, radius=np.maximum(motion.radius, LEAST_GRIP * spacing))
         held = self.body.held if held is None else held
-        spring = (SHARP_ANCHOR if self.simulator.kinks.count else ANCHOR) * rate**2
+        spring = (SHARP_ANCHOR if self.simulator.kinks.count else ANCHOR) * shear**2
         path = drive(
             motion,
             self.body.rest,
@@ -95,10 +100,36 @@ class Prepared:
             stiffness=spring,
             grip=grip,
         )
+        check_speed(path.path, path.step, spacing, fps)
+        # Tissue that cannot be squeezed pushes on its base far harder than it shears it.
+        path.stiffness[0] *= max(1.0, BASE * pressure**2 / self._held_motion(held) / spring)
+        path = replace(path, share=path.share * self._firmer(self.theta(values, places, held)))
         for name, term in laws.items():
             if term.drive is not None:
                 path = term.drive(path, **values[name])
         return path
+
+    def _firmer(self, theta: np.ndarray) -> np.ndarray | float:
+        """How many times stiffer than the rest each particle is, (P,): anchors hold it as much more firmly."""
+        laws, firmer = choose(self.terms), 1.0
+        at = dict(zip(columns(laws), theta.T, strict=True))
+        for name, term in laws.items():
+            if term.factor is not None and term.stiffens is not None:
+                firmer = firmer * term.stiffens(**{c: at[f"{name}.{c}"] for c in term.row(defaults(term))})
+        return firmer
+
+    def _held_motion(self, held: np.ndarray) -> float:
+        """Largest share of any motion's inertia that is held tissue's: what a spring on that counts for in the step."""
+        if not held.any() or isinstance(self.simulator, Updated):
+            return 1.0
+        root = np.sqrt(self.simulator.node_mass(np.ones(len(held))))
+        weight = self._carried.multiply(np.sqrt(self.simulator.volume_p * held)[:, None]) @ sparse.diags(1 / root)
+        return float(eigsh(weight.T @ weight, 1, v0=root, tol=1e-2, return_eigenvectors=False)[0])
+
+    @cached_property
+    def _carried(self) -> sparse.csr_matrix:
+        """Nodes to particles, (P, A)."""
+        return self.simulator.carry(self.simulator.rest)
 
 
 def prepare(

@@ -6,20 +6,21 @@ memory allowed is walked in several stretches.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import warp as wp
 
+from surgisim.mpm.by_cell import ByCell
+from surgisim.mpm.by_particle import ByParticle
 from surgisim.mpm.culprit import culprit
 from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
-from surgisim.mpm.kernels import node_kernels, particle_kernels, shapes, tick
+from surgisim.mpm.kernels import node_kernels, shapes, tick
 from surgisim.mpm.kink import Ball
-from surgisim.mpm.march import march
+from surgisim.mpm.march import March, Phases
 from surgisim.mpm.nodes import Nodes
 from surgisim.physics.catalogue import choose, columns
 from surgisim.problem import Problem
@@ -30,6 +31,11 @@ NEVER = 2**31 - 1
 
 State = tuple[np.ndarray, ...]
 """u, v over solid nodes, (A, 3) each, and, where a law has memory, q, (P, S)."""
+
+
+def by_cell(device: str) -> bool:
+    """Whether particles are stepped cell by cell there, as on a CPU, or each by itself."""
+    return not wp.get_device(device).is_cuda
 
 
 class Breakdown(Problem):
@@ -95,34 +101,26 @@ class Simulator(Nodes):
         self.rest, self.terms, self.device, self.density = np.asarray(rest, float), tuple(terms), device, float(density)
         self.count, self.volume_p, self.precision = len(rest), np.asarray(volume, float), precision
         super().__init__(grid, self.rest, self.volume_p, cut, balls)
-        self.types = shapes(precision)
+        self.types, self.threads = shapes(precision), threads
         self.real = np.float32 if precision == "single" else np.float64
         local, links = self.links(self.rest)
         # A kink's weights sum to nothing: its inertia is what keeps it as slow as a cell.
         inertia = grid.spacing**2 * (links[..., 1:] ** 2).sum(-1)
         self._local, self._weight = local, np.where(local < self.rule.shape[1], links[..., 0], inertia)
-        order = np.argsort(local.ravel(), kind="stable").astype(np.int32)
-        start = np.searchsorted(local.ravel()[order], np.arange(len(self.place) + 1)).astype(np.int32)
         s = self.types
-        self.index, self.link = self._put(local, int), self._put(links, s.Link)
-        self.start, self.entry = self._put(start, int), self._put(order, int)
-        self.volume, self.rest_d = self._put(self.volume_p, s.real), self._put(self.rest, s.Vec)
         self.gravity = s.Vec(*gravity)
-        self.scatter = not wp.get_device(device).is_cuda
-        ends = np.linspace(0, self.count, (threads if self.scatter else 1) + 1).astype(int)
-        self.parts = [(int(a), int(b - a)) for a, b in pairwise(ends)]
+        layout = ByCell if by_cell(device) else ByParticle
+        self.layout = layout(local, links, len(self.place), self.terms, precision, threads, self._put)
+        self.order, self.laws = self.layout.order, self.layout.laws
+        self.volume, self.rest_d = self._put(self.volume_p[self.order], s.real), self._put(self.rest[self.order], s.Vec)
         self.nodes = node_kernels(precision)
-        self.kernels = particle_kernels(self.terms, self.scatter, precision)
-        self.width = self.kernels.memory
+        self.width = self.laws.memory
         self.mass = self._put(self.node_mass(np.full(self.count, self.density)), s.real)
-        per_particle = 1 if self.scatter else self.count
-        self.stress = wp.zeros(per_particle, dtype=s.Mat, device=device)
-        self.push = wp.zeros(per_particle, dtype=s.Vec, device=device)
         self.clock = wp.zeros(2, dtype=int, device=device)
-        self.trouble = self._put(np.tile([NEVER, 0], (len(self.parts), 1)), int)
-        self.force = wp.zeros((len(self.parts), len(self.place)), dtype=s.Vec, device=device)
+        self.trouble = self._put(np.tile([NEVER, 0], (self.layout.parts, 1)), int)
+        self.force = wp.zeros((self.layout.parts, len(self.place)), dtype=s.Vec, device=device)
         # Loaded here, once: two threads that load one module at their first launch crash the process.
-        for kernel in (self.kernels.step, self.kernels.adjoint, *vars(self.nodes).values(), tick):
+        for kernel in (self.layout.kernels.step, self.layout.kernels.adjoint, *vars(self.nodes).values(), tick):
             wp.load_module(kernel.module, device=device)
 
     def node_mass(self, density: np.ndarray) -> np.ndarray:
@@ -148,16 +146,28 @@ class Simulator(Nodes):
         number stops being finite, naming step, particle and law.
         """
         last = drive.frames - 1 if last is None else last
+        states = []
+        for k, (state, _) in enumerate(self.play(theta, drive, begin=begin, first=first, last=last)):
+            states.append(state)
+            if progress and k:
+                progress(k, last - first, f"frame {first + k}/{drive.frames - 1}")
+        return Run(*(np.stack(part) for part in zip(*states, strict=True)))
+
+    def play(
+        self, theta: np.ndarray, drive: Drive, *, begin: State | None = None, first: int = 0, last: int | None = None
+    ) -> Iterator[tuple[State, wp.array]]:
+        """As `run`, frame by frame: the state, and the nodal displacement where it lies on the device, (A,) vec3."""
+        last = drive.frames - 1 if last is None else last
         task = self._task(theta, drive, 2)
         self._load(task, begin or (), first * drive.per_frame)
-        states = [self._state(task, 0)]
+        state = self._state(task, 0)
+        yield state, task.u[0]
         for frame in range(first, last):
-            march(task.forward, drive.per_frame)
-            states.append(self._state(task, (frame + 1 - first) * drive.per_frame % 2))
-            self._check(states, theta, drive, frame)
-            if progress:
-                progress(frame + 1 - first, last - first, f"frame {frame + 1}/{drive.frames - 1}")
-        return Run(*(np.stack(part) for part in zip(*states, strict=True)))
+            task.forward.march(drive.per_frame)
+            slot = (frame + 1 - first) * drive.per_frame % 2
+            before, state = state, self._state(task, slot)
+            self._check(before, state, theta, drive, frame)
+            yield state, task.u[slot]
 
     # Backward
 
@@ -204,14 +214,15 @@ class Simulator(Nodes):
         starts = [state]
         self._load(task, state, step)
         for _ in range(math.ceil(count / stretch) - 1):
-            march(task.forward, stretch)
+            task.forward.march(stretch)
             starts.append(self._state(task, stretch))
             self._load(task, starts[-1], step + (len(starts) - 1) * stretch)
         for k in reversed(range(len(starts))):
             length = min(stretch, count - k * stretch)
             self._load(task, starts[k], step + k * stretch)
-            march(task.forward, length)
-            march(back.commands, length)
+            task.forward.march(length)
+            wp.launch(tick, 1, [self.clock, -1], device=self.device)
+            back.commands.march(length)
 
     def _stretch(self, per: int, memory_mb: float) -> int:
         """Steps that are recorded at once, so that their states and the starts of the other stretches fit."""
@@ -230,13 +241,13 @@ class Simulator(Nodes):
         return stretch
 
     def _theta_bar(self, back: "_Back") -> np.ndarray:
-        theta_bar = back.theta.numpy().astype(float)
+        theta_bar = self._by_particle(back.theta.numpy().astype(float))
         laws = choose(self.terms)
-        heavy = [columns(laws).index(f"{n}.{laws[n].mass}") for n in self.kernels.laws.mass]
+        heavy = [columns(laws).index(f"{n}.{laws[n].mass}") for n in self.laws.mass]
         if heavy:
             # The density acts through the nodes' mass and through forces that are proportional to it.
             through = (self._weight * back.mass.numpy()[self._local]).sum(1) * self.volume_p
-            theta_bar[:, heavy] += (through + back.rho.numpy())[:, None]
+            theta_bar[:, heavy] += (through + self._by_particle(back.rho.numpy()))[:, None]
         return theta_bar
 
     # Parts
@@ -251,75 +262,62 @@ class Simulator(Nodes):
     def _task(self, theta: np.ndarray, drive: Drive, slots: int) -> "_Task":
         """Device arrays and recorded launches of one run."""
         theta = np.asarray(theta)
-        if theta.shape != (self.count, self.kernels.columns):
-            raise Problem(f"theta is {theta.shape}, but ({self.count}, {self.kernels.columns}) is wanted.")
+        if theta.shape != (self.count, self.laws.columns):
+            raise Problem(f"theta is {theta.shape}, but ({self.count}, {self.laws.columns}) is wanted.")
         s, laws = self.types, choose(self.terms)
         density = np.full(self.count, self.density)
-        for name in self.kernels.laws.mass:
+        for name in self.laws.mass:
             density = density + theta[:, columns(laws).index(f"{name}.{laws[name].mass}")]
-        if self.kernels.laws.mass:
+        if self.laws.mass:
             self.mass.assign(self.node_mass(density).astype(self.real))
         u, v = (self._zeros((slots, len(self.place)), s.Vec) for _ in range(2))
-        q = self._zeros((slots, self.count if self.width else 1), self.kernels.laws.Memory)
-        shared = [
-            self.clock, self.index, self.link, self.volume, self._put(density, s.real), self.rest_d,
-            self._put(theta, s.real), self._anchors(drive), s.real(drive.step), slots,
+        q = self._zeros((slots, self.count if self.width else 1), self.laws.Memory)
+        inputs = [
+            self.volume, self._put(density[self.order], s.real), self.rest_d, self._put(theta[self.order], s.real),
+            self._anchors(drive), s.real(drive.step), slots, u, v, q,
         ]  # fmt: skip
-        inputs = [[*shared, part, begin, u, v, q] for part, (begin, _) in enumerate(self.parts)]
-        launch = {"device": self.device, "record_cmd": True}
-        outs = [self.stress, self.push, self.force, self.trouble]
-        nodes = [self.clock, self.mass, self.gravity, self.rule.shape[1], s.real(drive.step), slots, self.force, u, v]
+        step = [
+            self.clock, int(self.layout.ticks), self.mass, self.gravity, self.rule.shape[1], s.real(drive.step), slots,
+            self.force, u, v,
+        ]  # fmt: skip
         forward = [
-            self._particles(self.kernels.step, inputs, outs),
-            [wp.launch(self.nodes.step, len(self.place), nodes, **launch)],
-            [wp.launch(tick, 1, [self.clock, 1], **launch)],
+            *self.layout.forward(self.clock, inputs, self.force, self.trouble),
+            [wp.launch(self.nodes.step, len(self.place), step, device=self.device, record_cmd=True)],
+            *self._tick(1),
         ]
-        if not self.scatter:
-            links = [self.start, self.entry, self.link, self.stress, self.push, self.force]
-            forward.insert(1, [wp.launch(self.nodes.gather, len(self.place), links, **launch)])
-        return _Task(slots, u, v, q, inputs, forward)
+        return _Task(slots, u, v, q, inputs, March(forward, self.device))
+
+    def _tick(self, by: int) -> Phases:
+        if self.layout.ticks:
+            return []
+        return [[wp.launch(tick, 1, [self.clock, by], device=self.device, record_cmd=True)]]
 
     def _back(self, task: "_Task", drive: Drive, springs: bool) -> "_Back":
         """Device arrays and recorded launches of the way back; nothing is stepped by recording them."""
-        s, heavy = self.types, bool(self.kernels.laws.mass)
+        s, heavy, parts = self.types, bool(self.laws.mass), self.layout.parts
         f = self._zeros(len(self.place), s.Vec)
-        u, v = (self._zeros((len(self.parts), len(self.place)), s.Vec) for _ in range(2))
+        u, v = (self._zeros((parts, len(self.place)), s.Vec) for _ in range(2))
         m = self._zeros(len(self.place) if heavy else 0, s.real)
         rho = self._zeros(self.count if heavy else 0, s.real)
-        per_particle = 1 if self.scatter else self.count
-        F, G = (self._zeros(per_particle, s.Mat) for _ in range(2))
-        x, y = (self._zeros(per_particle, s.Vec) for _ in range(2))
-        q = self._zeros(self.count if self.width else 1, self.kernels.laws.Memory)
-        theta = self._zeros((self.count, self.kernels.columns), s.real)
-        parts = len(self.parts)
+        q = self._zeros(self.count if self.width else 1, self.laws.Memory)
+        theta = self._zeros((self.count, self.laws.columns), s.real)
         path = self._zeros((parts, *drive.path.shape[:2]), s.Vec)
         hold = self._zeros((parts, *(drive.hold.shape if springs else (0, 0))), s.real)
         stiffness = self._zeros((parts, len(drive.path) if springs else 0), s.Mat)
-        launch = {"device": self.device, "record_cmd": True}
         gravity = [self.gravity, self.rule.shape[1]]
         before = [self.clock, self.mass, *gravity, s.real(drive.step), task.slots, task.v, u, v, f, m]
-        outs = [f, F, G, x, y, u, v, q, theta, rho, path, hold, stiffness]
         commands = [
-            [wp.launch(tick, 1, [self.clock, -1], **launch)],
-            [wp.launch(self.nodes.before, len(self.place), before, **launch)],
-            self._particles(self.kernels.adjoint, task.inputs, outs),
+            [wp.launch(self.nodes.before, len(self.place), before, device=self.device, record_cmd=True)],
+            *self.layout.back(self.clock, task.inputs, f, u, v, [q, theta, rho, path, hold, stiffness]),
+            *self._tick(-1),
         ]
-        if not self.scatter:
-            links = [self.start, self.entry, self.link, F, G, x, y, u, v]
-            commands.append([wp.launch(self.nodes.gather_back, len(self.place), links, **launch)])
-        return _Back(u, v, q, theta, path, hold, stiffness, m, rho, commands)
-
-    def _particles(self, kernel, inputs: list, outs: list) -> list:
-        """One recorded launch for each share of the particles."""
-        return [
-            wp.launch(kernel, count, mine + outs, device=self.device, record_cmd=True)
-            for mine, (_, count) in zip(inputs, self.parts, strict=True)
-        ]
+        return _Back(u, v, q, theta, path, hold, stiffness, m, rho, March(commands, self.device))
 
     def _anchors(self, drive: Drive):
         s = self.types
         anchors = s.Anchors()
-        anchors.member, anchors.share = self._put(drive.member, int), self._put(drive.share, s.real)
+        anchors.member = self._put(drive.member[self.order], int)
+        anchors.share = self._put(drive.share[self.order], s.real)
         anchors.path, anchors.hold = self._put(drive.path, s.Vec), self._put(drive.hold, s.real)
         anchors.turning = int(drive.turn is not None)
         turn = np.zeros((1, 1, 3, 3)) if drive.turn is None else drive.turn
@@ -331,29 +329,37 @@ class Simulator(Nodes):
         """Put a state into the first slot; what it does not hold is zero."""
         for k, array in enumerate((task.u, task.v, task.q)):
             if k < len(state) and state[k].size:
-                array[0].assign(np.ascontiguousarray(state[k], self.real))
+                value = state[k][self.order] if array is task.q else state[k]
+                array[0].assign(np.ascontiguousarray(value, self.real))
             else:
                 array[0].zero_()
         self.clock.assign(np.array([0, step], np.int32))
-        self.trouble.assign(np.tile(np.array([NEVER, 0], np.int32), (len(self.parts), 1)))
+        self.trouble.assign(np.tile(np.array([NEVER, 0], np.int32), (self.layout.parts, 1)))
 
     def _state(self, task: "_Task", slot: int) -> State:
         u, v, q = (array[slot].numpy().copy() for array in (task.u, task.v, task.q))
-        return u, v, q if self.width else np.zeros((self.count, 0), self.real)
+        return u, v, self._by_particle(q) if self.width else np.zeros((self.count, 0), self.real)
 
-    def _check(self, states: list[State], theta: np.ndarray, drive: Drive, frame: int) -> None:
+    def _by_particle(self, sorted_rows: np.ndarray) -> np.ndarray:
+        """Rows in the device's order, in that of `rest`."""
+        rows = np.empty_like(sorted_rows)
+        rows[self.order] = sorted_rows
+        return rows
+
+    def _check(self, before: State, after: State, theta: np.ndarray, drive: Drive, frame: int) -> None:
         """Stop where the last frame went wrong, and say where, when and by which law."""
-        step, particle = min(self.trouble.numpy().tolist())
-        if step == NEVER and np.isfinite(states[-1][0]).all():
+        step, sorted_particle = min(self.trouble.numpy().tolist())
+        if step == NEVER and np.isfinite(after[0]).all():
             return
         if step == NEVER:
             raise Breakdown(
                 f"simulation: a displacement is not finite between frames {frame} and {frame + 1}. Take a smaller step."
             )
+        particle = int(self.order[sorted_particle])
         task = self._task(theta, drive, 2)
-        self._load(task, states[-2], frame * drive.per_frame)
-        march(task.forward, max(0, step - frame * drive.per_frame - 1))
-        law = culprit(self, theta, self._state(task, max(0, step - frame * drive.per_frame - 1) % 2), int(particle))
+        self._load(task, before, frame * drive.per_frame)
+        task.forward.march(max(0, step - frame * drive.per_frame - 1))
+        law = culprit(self, theta, self._state(task, max(0, step - frame * drive.per_frame - 1) % 2), particle)
         where = np.round(self.rest[particle], 4).tolist()
         raise Breakdown(
             f"simulation: particle {particle} at rest position {where} m turned inside out (or stopped being a "
@@ -369,7 +375,7 @@ class _Task:
     v: wp.array
     q: wp.array
     inputs: list
-    forward: list
+    forward: March
 
 
 @dataclass(frozen=True)
@@ -383,4 +389,4 @@ class _Back:
     stiffness: wp.array
     mass: wp.array
     rho: wp.array
-    commands: list
+    commands: March

@@ -23,6 +23,7 @@ from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.kernels import shapes, tick
+from surgisim.mpm.march import March
 from surgisim.mpm.nodes import Nodes
 from surgisim.mpm.simulator import NEVER, Breakdown, Run
 from surgisim.physics.fold import folded
@@ -65,7 +66,7 @@ class Updated(Nodes):
             raise Problem(
                 f"mpm: the updated form has no place for {self.kernels.laws.mass}. Take estimation.form: total."
             )
-        for kernel in (self.kernels.scatter, self.kernels.nodes, self.kernels.gather, tick):
+        for kernel in (self.kernels.scatter, self.kernels.nodes, self.kernels.gather, self.kernels.clear, tick):
             wp.load_module(kernel.module, device=device)
 
     def run(
@@ -84,12 +85,10 @@ class Updated(Nodes):
         reach = np.abs(drive.path).max() + MARGIN * self.grid.spacing
         corners = np.stack([self.rest.min(0) - reach, self.rest.max(0) + reach])
         world = Grid.around(corners, self.grid.spacing)
-        launches, x, v, trouble = self._launches(theta, drive, world)
+        steps, x, v, trouble = self._launches(theta, drive, world)
         states = [self._state(x, v)]
         for frame in range(last):
-            for _ in range(drive.per_frame):
-                for launch in launches:
-                    launch.launch()
+            steps.march(drive.per_frame)
             self._check(trouble, drive)
             states.append(self._state(x, v))
             if progress:
@@ -128,18 +127,14 @@ class Updated(Nodes):
             clock, put(self.volume_p, s.real), float(self.density), rest, put(theta, s.real), anchors,
             float(drive.step), *place, x, v, C, F, q, node, trouble,
         ]  # fmt: skip
-        return (
-            [
-                wp.launch(k.scatter, self.count, args, **launch),
-                wp.launch(k.nodes, world.count, [s.Vec(*self.gravity), float(drive.step), node], **launch),
-                wp.launch(k.gather, self.count, [float(drive.step), *place, node, x, v, C, F], **launch),
-                wp.launch(k.clear, world.count, [node], **launch),
-                wp.launch(tick, 1, [clock, 1], **launch),
-            ],
-            x,
-            v,
-            trouble,
-        )
+        launches = [
+            wp.launch(k.scatter, self.count, args, **launch),
+            wp.launch(k.nodes, world.count, [s.Vec(*self.gravity), float(drive.step), node], **launch),
+            wp.launch(k.gather, self.count, [float(drive.step), *place, node, x, v, C, F], **launch),
+            wp.launch(k.clear, world.count, [node], **launch),
+            wp.launch(tick, 1, [clock, 1], **launch),
+        ]
+        return March([[one] for one in launches], self.device), x, v, trouble
 
     def _check(self, trouble, drive: Drive) -> None:
         step, particle = trouble.numpy().tolist()

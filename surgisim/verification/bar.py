@@ -5,17 +5,16 @@ viscosity. Axial: Love's rod, sqrt(E / rho) / (2 L) free and / (4 L) clamped at 
 lateral inertia. Bending: Timoshenko's beam. See beam_theory.py.
 
 Error model: free ends fall with the square of the spacing (nodal masses are lumped). At a clamp the anchors are
-springs of rate k = a mu / (rho dx^2) per unit of mass, which give way over a depth sqrt(E / (rho k)): the bar acts as
-if it were longer by dx sqrt(E / (a mu)), so the error there falls with the first power.
+springs of rate k per unit of mass (grip.py; it rises with 1 / dx^2), which give way over a depth sqrt(E / (rho k)): the
+bar acts as if it were longer by that, so the error there falls with the first power.
 """
 
 import numpy as np
 
-from surgisim.mpm.grip import ANCHOR
 from surgisim.verification.beam_theory import Square, axial, axial_shape, bending_shape, euler, timoshenko
 from surgisim.verification.drawing import COLORS, legend, panels, reference, slope
 from surgisim.verification.markdown import table
-from surgisim.verification.rod import CELLS, DENSITY, THICKNESS, block, rod
+from surgisim.verification.rod import CELLS, DENSITY, THICKNESS, block, rod, unmoved
 from surgisim.verification.vibration import strike, vibration
 
 TITLE = "Frequencies of a bar"
@@ -65,7 +64,8 @@ def frequency(kind: str, ends: str, nu: float, cells: int) -> dict:
     amplitude = STRAIN * (bar.length / 3 if kind == "axial" else bar.side)
     time, q, step = strike(laid, mode, theory, amplitude=amplitude, periods=1.5)
     found = vibration(time, q, 2 * np.pi * theory).frequency
-    longer = spacing * (2 * (1 + nu) / ANCHOR) ** 0.5 / bar.length if ends == "clamped" else 0.0
+    spring = laid.made.drive(unmoved(2), laid.values, fps=1 / step, per_frame=1).stiffness[0, 0, 0]
+    longer = (E / (DENSITY * spring)) ** 0.5 / bar.length if ends == "clamped" else 0.0
     return {
         "series": series(kind, ends, nu),
         "cells": cells,
@@ -125,7 +125,7 @@ below, is what `thickening` makes of tissue: 8 particles a cell and about {CELLS
 Largest error: {bound}. Slopes of the error over the spacing: {slopes}.
 
 Free ends converge with the square of the spacing. A clamp does not: it is made of springs on the held particles and
-gives way over about a fifth of a cell, so a bar held by it is longer by dx sqrt(E / (a mu)); the last column is
-what that alone does to the frequency. With nu 0 beam theory is exact at the clamp too; with nu 0.45 the clamp also
+gives way over a sixth of a cell and less, so a bar held by it is longer by that; the last column is what that alone
+does to the frequency. With nu 0 beam theory is exact at the clamp too; with nu 0.45 the clamp also
 hinders the bar from bulging, which no beam theory knows and which stiffens it a little.
 """

@@ -71,8 +71,14 @@ def test_a_tether_holds_back_only_what_leaves_it_and_only_beyond_its_slack():
 
 
 def test_a_stiff_inclusion_deforms_less_than_the_same_place_without_it():
+    made = prepare(
+        BODY, under("stiff_inclusion"), density=DENSITY, places={"stiff_inclusion": MIDDLE}, gravity=(0.0, 0.0, -9.81),
+        precision="double",
+    )  # fmt: skip
     ends = np.array(MIDDLE.center) + np.array([[0.0, 0.0, -0.003], [0.0, 0.0, 0.003]])
-    stiff, plain, soft = (np.ptp(moved("stiff_inclusion", points=ends, s=s)[0][500 // EVERY], 0) for s in (8, 1, 0.2))
+    stiff, plain, soft = (
+        np.ptp(moved("stiff_inclusion", LEFT_ALONE, made, points=ends, s=s)[0][-1], 0) for s in (8, 1, 0.2)
+    )
     assert np.linalg.norm(stiff) < 0.7 * np.linalg.norm(plain) < np.linalg.norm(plain) < np.linalg.norm(soft)
 
 
@@ -80,7 +86,7 @@ def test_breathing_moves_the_whole_body_at_its_period():
     corners = BODY.rest[[0, -1]] * 0.9 + 0.1 * BODY.rest.mean(0)
     amplitude, period = 0.002, 0.2
     breath = {"amplitude": amplitude, "period": period, "second": 0.0, "phase": -np.pi / 2}
-    u, time = moved("respiration", LEFT_ALONE, points=corners, base={"E": 40000.0}, **breath)
+    u, time = moved("respiration", LEFT_ALONE, points=corners, base={"E": 20000.0}, **breath)
     wanted = amplitude * (1 - np.cos(2 * np.pi * time / period))
     assert np.abs(u[..., 2] - wanted[:, None]).max() < 0.15 * np.ptp(wanted)
     assert np.abs(u[..., :2]).max() < 0.15 * np.ptp(wanted)

@@ -1,8 +1,9 @@
 """What a body lacks that is let go and swings: each law in the engine itself, fitted, and tried on another take.
 
-The diagnosis of pulled tissue answers forces by a tangent stiffness, which a body that swings does not obey. Here nothing
-is linearised: every candidate is run, its first number scanned and all of them fitted to one take, and what is named is the
-law under which another take, never fitted, is predicted best. A law within CLOSE of the best there cannot be told from it.
+The diagnosis of pulled tissue answers forces by a tangent stiffness, which a body that swings does not obey. Here
+nothing is linearised: every candidate is run, its first number scanned and all of them fitted to one take, and what is
+named is the law under which another take, never fitted, is predicted best. A law within CLOSE of the best there cannot
+be told from it.
 """
 
 from collections.abc import Callable, Mapping

@@ -7,13 +7,10 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from surgisim.phantom.elements import Elements, elements
-from surgisim.phantom.march import advance, least_swelling, stable_step
+from surgisim.phantom.march import SAFETY, advance, least_swelling, stable_step
 from surgisim.problem import Problem
 from surgisim.verification.manipulated.mesh import Mesh, mesh
 from surgisim.verification.manipulated.scene import FINE, FPS, Scene
-
-SAFETY = 0.85
-"""Of the largest stable step at rest; what limits it are the small elements inside the balls, which hardly strain."""
 
 
 def follow(
