@@ -22,7 +22,7 @@ from surgisim.proof.known.catalogue import Found
 from surgisim.recordings.recording import Recording
 
 CLOSE = 1.10
-EVALUATIONS = 8
+EVALUATIONS = 5
 DIFFERENCE = 0.03
 """Relative step of the differences that a fit goes by."""
 
