@@ -75,7 +75,9 @@ def fit_base(
         drive, run = simulate(prepared, clip, x, memo, clip.frames if last else until)
         simulated = carried(carry, run)
         near = tangent(prepared, values_of(x), drive, run, clip.rest, until)
-        around = _Around(clip, whiten, space, memo, prepared, carry, x, run, simulated[:, :until], _by_poisson(prepared, near, x))
+        around = _Around(
+            clip, whiten, space, memo, prepared, carry, x, run, simulated[:, :until], _by_poisson(prepared, near, x)
+        )
         if not last:
             x = around.descend(around.start() if iteration == 0 else x, say)
     slopes = around.slopes(x)
@@ -129,8 +131,7 @@ class _Around:
 
     def start(self) -> np.ndarray:
         """The best of a few stiffnesses and viscosities: a ring-down misfits by whole periods."""
-        tries = [self.x + [e, 0.0, lag] for e in SCAN for lag in SCAN]
-        tries = [np.clip(y, LOW, HIGH) for y in tries]
+        tries = [np.clip(self.x + np.array([e, 0.0, lag]), LOW, HIGH) for e in SCAN for lag in SCAN]
         return min(tries, key=lambda y: self.cost(y, self.left(y)))
 
     def descend(self, y: np.ndarray, say: Callable[[str], None]) -> np.ndarray:

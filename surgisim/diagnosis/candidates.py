@@ -8,6 +8,8 @@ tangent's states.
 
 from collections.abc import Callable, Iterator
 
+import numpy as np
+
 from surgisim.diagnosis import local, memory, whole
 from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
@@ -21,6 +23,8 @@ Parts = Iterator[tuple[str, Callable[[], Iterator[Block]]]]
 def blocks(clip: Clip, base: Base) -> Parts:
     """All that is tried, one part after the other, each made when it is asked for."""
     yield "laws of the whole body", lambda: iter([whole.everywhere(clip, base)])
+    turns = np.arange(whole.ANGLES) * np.pi / whole.ANGLES
+    yield "strands", lambda: iter([whole.strands(clip, base, turns, (0.2,))])
     yield "laws that remember", lambda: iter([memory.remembering(clip, base)])
     yield "weight", lambda: iter([whole.bulk(clip, base)])
     if clip.body.held.any():

@@ -16,6 +16,10 @@ DENSITY = 1050.0
 """Of tissue, where the recording gives none [kg/m^3]."""
 SHARE = 0.165
 """Spacing of the grid over the cube root of the body's volume."""
+SETTLES = 4
+"""Frames after a release that are not taken as still."""
+QUIET = 1.6
+"""Times the step of the quietest fifth of the frames, below which a frame counts as quiet where nothing is gripped."""
 MOST = 120
 """Points that are used at most; neighbours' errors are alike, so more of them tell little more."""
 LEAST_SEEN = 0.3
@@ -65,10 +69,26 @@ class Clip:
     def prepared(self, terms: tuple[str, ...], threads: int = 1, motion: Motion | None = None) -> Prepared:
         """The body on its grid with these laws."""
         grips = self.motion if motion is None else motion
+        # What begins settled hangs in balance with its weight; what is let go does not.
+        falls = self.recording.starts == "released" and self.recording.gravity is not None
         return prepare(
             self.body, terms, density=self.density, carried=self.rest, grips=grips if len(grips.radius) else None,
-            threads=threads,
+            threads=threads, gravity=self.recording.gravity if falls else (0.0, 0.0, 0.0),
         )  # fmt: skip
+
+    def quiet(self) -> np.ndarray:
+        """Frames in which tissue is still or moves slowly: what the noise is read from, (T,) bool."""
+        if not len(self.motion.radius):
+            # Nobody says when; the quietest of the frames do.
+            step = np.linalg.norm(np.diff(self.moved, axis=1, prepend=self.moved[:, :1]), axis=-1)
+            both = self.seen & np.roll(self.seen, 1, axis=1)
+            middle = np.array([np.median(s[b]) if b.any() else np.inf for s, b in zip(step.T, both.T, strict=True)])
+            return middle < QUIET * np.percentile(middle[1 : self.until], 20)
+        phase = self.phases()
+        still = phase != PHASES.index("load")
+        for frame in np.flatnonzero((phase == PHASES.index("release")) & (np.roll(phase, 1) != phase)):
+            still[frame : frame + SETTLES] = False
+        return still
 
     def phases(self) -> np.ndarray:
         """Index into PHASES of every frame, (T,)."""

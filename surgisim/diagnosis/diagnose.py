@@ -12,19 +12,19 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, nuisance, verdict
 from surgisim.diagnosis.base import Base, fit_base
 from surgisim.diagnosis.candidates import Parts, blocks, costly
-from surgisim.diagnosis.clip import PHASES, Clip, clip_of
+from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.evidence import Finding, by_law, judge
 from surgisim.diagnosis.flexible import flexible
 from surgisim.diagnosis.laws import law_of, respond
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
+from surgisim.diagnosis.refine import refined
+from surgisim.diagnosis.sharpen import finer
 from surgisim.mpm.simulator import Breakdown
 from surgisim.recordings.recording import Recording
 
 Progress = Callable[[float, float, str], None]
-SETTLES = 4
-"""Frames after a release that are not taken as still."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,8 @@ class Refit:
     """What it adds to the base at this amplitude over the whole clip [m], (K, T, 3)."""
     gain: float
     log_evidence: float
+    free: bool = False
+    """Whether its place, time and form were fitted too."""
 
     @property
     def term(self) -> str:
@@ -69,9 +71,9 @@ def diagnose(
     case = prepare_case(clip, settings, memo, progress)
     findings = search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.4 * s, 1, text))
     laws = by_law(findings)
-    bend = flexible(case.clip, case.whiten, case.space, case.z)
+    bend = flexible(case.clip, case.whiten, case.space, case.z, case.nulls)
     detected = max(entry[0] for entry in laws.values()) > threshold(laws, settings)
-    if detected and max(f.gain for f in findings) < calibration.EXPLAINED_WELL * bend.gain:
+    if detected and max(f.gain for f in findings) < calibration.EXPLAINED_WELL * verdict.explainable(bend):
         parts = costly(clip, case.base, memo)
         findings += search(case, case.z, case.nulls, lambda s, text: progress(0.62, 1, text), parts)
         laws = by_law(findings)
@@ -80,10 +82,15 @@ def diagnose(
         rivals = [t for t in ranked if laws[t][2][0].gain > calibration.RIVAL * laws[ranked[0]][2][0].gain]
         for n, term in enumerate(rivals[: settings.refine]):
             progress(0.65 + 0.2 * n / settings.refine, 1, f"the engine with {term}")
-            refits.append(refit(case, laws[term][2][0], laws[term][0], case.z))
+            fine, evidence = sharpened(case, laws[term], case.z)
+            refits.append(refit(case, fine, evidence, case.z))
+        refits.sort(key=lambda r: -r.log_evidence)
+        for n, one in enumerate(refits[: settings.polish]):
+            done = 0.75 + 0.1 * n / settings.polish
+            refits[n] = polished(case, one, case.z, lambda text, done=done: progress(done, 1, text))
         refits.sort(key=lambda r: -r.log_evidence)
     second = None
-    if detected and settings.second and refits[0].gain < calibration.EXPLAINED_WELL * bend.gain:
+    if detected and settings.second and refits[0].gain < calibration.EXPLAINED_WELL * verdict.explainable(bend):
         progress(0.86, 1, f"what {refits[0].term} leaves")
         second = another(case, refits[0], progress)
     progress(0.95, 1, "verdict")
@@ -92,13 +99,10 @@ def diagnose(
 
 def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress) -> Case:
     """Noise, base, nuisances."""
-    until, phase = clip.until, clip.phases()
-    still = phase != PHASES.index("load")
-    for frame in np.flatnonzero((phase == PHASES.index("release")) & (np.roll(phase, 1) != phase)):
-        still[frame : frame + SETTLES] = False
+    until = clip.until
     fitted = slice(0, until)
     noise = estimate(
-        clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, still[fitted], clip.recording.sigma[clip.kept]
+        clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, clip.quiet()[fitted], clip.recording.sigma[clip.kept]
     )
     if settings.noise == "independent":
         noise = replace(
@@ -170,6 +174,29 @@ def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: 
     return Refit(finding, kept, response, gain, evidence + 0.5 * (gain - finding.gain))
 
 
+def polished(case: Case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
+    """The same law with everything about it free; as it was where that gains nothing."""
+    start = one.finding.hypothesis, one.amplitude
+    found = refined(case.clip, case.base, case.whiten, case.space, case.memo, z, start, say)
+    if found is None or found.gain <= one.gain:
+        return one
+    finding = replace(one.finding, hypothesis=found.hypothesis, spread=found.spread)
+    better = {"finding": finding, "amplitude": found.amplitude, "response": found.response, "gain": found.gain}
+    return replace(one, **better, log_evidence=one.log_evidence + 0.5 * (found.gain - one.gain), free=True)
+
+
+def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:
+    """A law's best finding on two finer lattices, and the law's evidence with what that gains."""
+    evidence, _, findings = law
+    best = findings[0]
+    residual, seen = z[:, None].astype(np.float32), case.clip.seen[:, : case.clip.until]
+    for step in (1.0, 0.5):
+        for block in finer(case.clip, case.base, best.hypothesis, step):
+            found = judge(block, case.whiten, case.space, residual, -1, seen)
+            best = max([best, *(f for f in found if f.hypothesis.term == best.hypothesis.term)], key=lambda f: f.gain)
+    return best, evidence + 0.5 * (best.gain - findings[0].gain)
+
+
 def another(case: Case, first: Refit, progress: Progress) -> tuple[Refit, float] | None:
     """The second effect that pays most once the first is there, and its log evidence; None where none does."""
     until = case.clip.until
@@ -183,4 +210,5 @@ def another(case: Case, first: Refit, progress: Progress) -> tuple[Refit, float]
     best = max(laws, key=lambda term: laws[term][0])
     if laws[best][0] < threshold(laws, case.settings):
         return None
-    return refit(left, laws[best][2][0], laws[best][0], z), laws[best][0]
+    fine, evidence = sharpened(left, laws[best], z)
+    return refit(left, fine, evidence, z), evidence

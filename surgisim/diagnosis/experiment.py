@@ -12,7 +12,6 @@ from surgisim.diagnosis.hypothesis import ease
 from surgisim.diagnosis.laws import Law, respond
 from surgisim.diagnosis.memo import Memo
 from surgisim.mpm.simulator import Breakdown
-from surgisim.recordings.recording import Recording
 
 PULL, HOLD, REST = 0.6, 1.2, 0.8
 """How long a proposed pull takes, holds, and is watched after its release [s]."""
@@ -22,9 +21,7 @@ def separating(clip: Clip, base: Base, first: Law, second: Law, memo: Memo, name
     """The pull, of a few, under which the two laws differ most, in words."""
     best = None
     for text, motion in pulls(clip, rng):
-        trial = replace(
-            clip, recording=_under(clip.recording, motion), moved=np.zeros((len(clip.kept), len(motion.active[0]), 3))
-        )
+        trial = _instead(clip, motion)
         try:
             seen = [respond(trial, base, replace(law, motion=None, begins=0.0), memo) for law in (first, second)]
         except Breakdown:
@@ -37,12 +34,15 @@ def separating(clip: Clip, base: Base, first: Law, second: Law, memo: Memo, name
     return f"{best[1]}: {names[0]} and {names[1]} would then differ by {1e3 * best[0]:.2g} mm RMS."
 
 
-def _under(recording: Recording, motion: Motion) -> Recording:
-    """The recording's body under another motion; nothing is observed of it."""
-    seen = np.zeros((len(recording.points), motion.active.shape[1]), bool)
-    points = np.full((*seen.shape, 3), np.nan, np.float32)
-    place = recording.attached()
-    return replace(recording, motion=motion, points=points, visible=seen, place=place, split=None)
+def _instead(clip: Clip, motion: Motion) -> Clip:
+    """The same body under another motion, with nothing recorded of it."""
+    recording, frames = clip.recording, motion.active.shape[1]
+    shape = (len(recording.sigma), frames)
+    unseen = np.full((*shape, 3), np.nan, np.float32)
+    planned = replace(
+        recording, motion=motion, points=unseen, visible=np.zeros(shape, bool), place=recording.attached(), split=None
+    )
+    return replace(clip, recording=planned, moved=np.zeros((len(clip.kept), frames, 3)))
 
 
 def pulls(clip: Clip, rng: np.random.Generator) -> list[tuple[str, Motion]]:

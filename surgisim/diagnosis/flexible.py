@@ -21,22 +21,24 @@ SIZE = 6e-4
 @dataclass(frozen=True)
 class Flexible:
     gain: float
-    """Of chi square, less what noise alone would gain."""
+    """Of chi square, less what it gains on nulls on average."""
     fitted: np.ndarray
     """[m], (K, T_fit, 3)."""
 
 
-def flexible(clip: Clip, whiten: Whitener, space: Metric, z: np.ndarray) -> Flexible:
-    """A smooth field fitted to a whitened residual, each coefficient with the same modest prior."""
+def flexible(clip: Clip, whiten: Whitener, space: Metric, z: np.ndarray, nulls: np.ndarray) -> Flexible:
+    """A smooth field fitted to a whitened residual (N,), each coefficient with the same modest prior.
+
+    nulls: residuals of nothing, (N, D), on which the same is done.
+    """
     columns = _columns(clip, clip.until)
     white = whiten(columns).T.astype(np.float32)
-    gram, shadow = space.gram(white, white), space.gram(white, z[:, None])[:, 0]
+    gram, shadow = space.gram(white, white), space.gram(white, np.concatenate([z[:, None], nulls], 1))
     unit = SIZE / np.sqrt(3 * PATTERNS)
     A = gram + np.eye(len(gram)) / unit**2
     x = np.linalg.solve(A, shadow)
-    freedom = float(np.trace(np.linalg.solve(A, gram)))
-    gain = float(2 * x @ shadow - x @ gram @ x) - freedom
-    return Flexible(gain, np.tensordot(x, columns, 1))
+    gains = (x * (2 * shadow - gram @ x)).sum(0)
+    return Flexible(float(gains[0] - gains[1:].mean()), np.tensordot(x[:, 0], columns, 1))
 
 
 def smooth_part(clip: Clip, residual: np.ndarray, seen: np.ndarray) -> np.ndarray:

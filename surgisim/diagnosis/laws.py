@@ -10,7 +10,7 @@ from surgisim.diagnosis.base import SAFETY, Base, carried
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.hypothesis import RISE, Hypothesis
 from surgisim.diagnosis.memo import Memo
-from surgisim.mpm.setup import Values
+from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Run
 from surgisim.physics.catalogue import choose
 from surgisim.physics.place import Place
@@ -72,9 +72,11 @@ def law_of(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> Law:
         return Law({term: {**own, "cap": h.about["cap"] / max(a, 1e-3)}}, {})
     yaw, pitch = angles(h.about["axis"])
     period, slowness = h.about["period"], h.about["period"] / h.about["wavelength"]
+    # Whole periods earlier, so that every part of the body is in its rhythm when it sets in.
     onset = -h.about["phase"] / (2 * np.pi) * period - 4 * period
     own = {"onset": onset, "period": period, "duty": 0.5, "slowness": slowness, "yaw": yaw, "pitch": pitch}
-    return Law({"active_contraction": {"tension": a, **own}}, {})
+    begins = h.onset + 0.15 if h.onset else 0.0
+    return Law({"active_contraction": {"tension": a, **own}}, {}, begins=begins)
 
 
 def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = None) -> np.ndarray:
@@ -86,8 +88,7 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
     def make() -> dict[str, np.ndarray]:
         prepared = clip.prepared(tuple(values), motion=motion)
         theta = prepared.theta(values, law.places)
-        rows = prepared.stiffest(theta)
-        per_frame = max(prepared.per_frame_of(rows, clip.fps, SAFETY), base.drive.per_frame)
+        per_frame = steps(clip, base, prepared, theta)
         drive = prepared.drive(motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames, places=law.places)
         first = int(law.begins * clip.fps)
         begin = None if first == 0 else base.run.state(first)[:2]
@@ -98,6 +99,11 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
     moved = None if law.motion is None else np.round(law.motion.position, 9).tolist()
     where = {n: [list(p.center), p.extent, p.normal] for n, p in law.places.items()}
     return memo(["law", base.x.tolist(), values, _plain(where), moved, law.begins, frames], make)["seen"].astype(float)
+
+
+def steps(clip: Clip, base: Base, prepared: Prepared, theta: np.ndarray) -> int:
+    """Stable steps a frame with the law."""
+    return max(prepared.per_frame_of(prepared.stiffest(theta), clip.fps, SAFETY), base.drive.per_frame)
 
 
 def angles(direction: np.ndarray) -> tuple[float, float]:

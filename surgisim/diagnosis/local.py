@@ -14,11 +14,17 @@ from surgisim.physics.place import Place
 
 BLOB = 0.0032
 """Extent of a push or a band that is tried, likewise [m]."""
+LASTS = (0.5, 0.8, 1.2, 2.0)
+"""How long an unseen push is tried [s]."""
+SHIFTS = (-0.1, -0.05, 0.0, 0.05, 0.1)
+"""By which moments are moved when a hypothesis is sharpened [s]."""
 LUMP = 0.0040
 """Extent of a lump, likewise [m]."""
 
 
-def pushes(clip: Clip, base: Base, center: np.ndarray, extent: float | None = None) -> Block:
+def pushes(
+    clip: Clip, base: Base, center: np.ndarray, extent: float | None = None, near_to: Hypothesis | None = None
+) -> Block:
     """A push at one place with a free course: unseen contact, added mass, a band."""
     near, simulator = base.tangent, base.prepared.simulator
     extent = extent or BLOB * scale(clip)
@@ -29,14 +35,22 @@ def pushes(clip: Clip, base: Base, center: np.ndarray, extent: float | None = No
     states = near.at_states(np.broadcast_to(loads, (len(near.frames), *loads.shape)))
     bumps, at = hats(clip), knots(clip)
     columns = np.stack([near.over_time(states[:, d], bump) for d in range(3) for bump in bumps])
-    found = [*_contacts(clip, place, at), *_masses(clip, place, at), *_bands(clip, base, place, weight, at)]
+    begins, lengths = moments(clip, 22), LASTS
+    if near_to is not None and near_to.onset is not None:
+        begins = near_to.onset + np.array(SHIFTS)
+        lengths = near_to.end - near_to.onset + np.array(SHIFTS) if near_to.end is not None else LASTS
+    found = [
+        *_contacts(place, at, begins[:: 1 if near_to else 2], lengths),
+        *_masses(clip, place, at, begins),
+        *_bands(clip, base, place, weight, at),
+    ]
     return Block(columns, found)
 
 
-def _contacts(clip, place, at) -> Iterator[Hypothesis]:
+def _contacts(place, at, begins, lengths) -> Iterator[Hypothesis]:
     last = at[-1]
-    for begin in moments(clip, 14):
-        for length in (0.5, 0.8, 1.2, 2.0):
+    for begin in begins:
+        for length in lengths:
             end = begin + length
             if end < last + 0.3:
                 course = ease((at - begin) / RISE) * ease((end - at) / RISE)
@@ -44,10 +58,10 @@ def _contacts(clip, place, at) -> Iterator[Hypothesis]:
                     yield Hypothesis("hidden_contact", spread(course), 0, place, begin, end)
 
 
-def _masses(clip, place, at) -> Iterator[Hypothesis]:
+def _masses(clip, place, at, begins) -> Iterator[Hypothesis]:
     gravity = clip.recording.gravity
     down = -clip.normal if gravity is None or not any(gravity) else np.array(gravity) / np.linalg.norm(gravity)
-    for begin in moments(clip, 22):
+    for begin in begins:
         course = ease((at - begin) / RISE)
         if course.any():
             yield Hypothesis("added_mass", spread(course) @ down[:, None], 1, place, begin, None, {"down": down})

@@ -25,13 +25,17 @@ STEPS = 2
 """Steps between two frames in which a memory advances."""
 
 
-def remembering(clip: Clip, base: Base) -> Block:
+FORMS = (
+    *(("relaxation", {"G": 1.0, "tau": t}) for t in TAUS),
+    *(("plastic_set", {"yield_strain": y, "share": SMALL}) for y in YIELDS),
+    *(("damage", {"onset": y, "rate": SMALL}) for y in TEARS),
+)
+
+
+def remembering(clip: Clip, base: Base, forms=FORMS) -> Block:
     """Laws that remember: relaxation, plastic set, damage; followed along every frame."""
     near, laws = base.tangent, choose(["relaxation", "plastic_set", "damage"])
     until, count = clip.until, len(base.prepared.simulator.rest)
-    forms = [("relaxation", {"G": 1.0, "tau": t}) for t in TAUS]
-    forms += [("plastic_set", {"yield_strain": y, "share": SMALL}) for y in YIELDS]
-    forms += [("damage", {"onset": y, "rate": SMALL}) for y in TEARS]
     memory = [np.zeros((count, laws[n].memory)) for n, _ in forms]
     loads = np.zeros((len(forms), until, 3 * len(base.prepared.simulator.place)))
     still = np.zeros((count, 3, 3))

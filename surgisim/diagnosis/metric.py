@@ -38,6 +38,6 @@ class Metric:
 
 def metric(columns: np.ndarray) -> Metric:
     """columns: whitened and scaled to one prior standard deviation, (N, M)."""
-    U = np.ascontiguousarray(columns, np.float32)
+    U = np.ascontiguousarray(columns if columns.shape[1] else np.zeros((len(columns), 1)), np.float32)
     normal = (U.T @ U).astype(float)
     return Metric(U, cho_factor(np.eye(len(normal)) + normal))

@@ -1,6 +1,7 @@
 """From fits to a verdict: probabilities, intervals, held-out errors, and what is said in words."""
 
 import numpy as np
+from scipy.special import expit
 
 from surgisim.artifacts.diagnosis import Diagnosis
 from surgisim.artifacts.mismatch import Mismatch
@@ -23,7 +24,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
     clip, base = case.clip, case.base
     rng = np.random.default_rng([case.settings.seed, 1])
     chances = probabilities(laws, refits, detected)
-    total = max(bend.gain, max([r.gain for r in refits], default=0.0), 1e-9)
+    total = max(explainable(bend), max([r.gain for r in refits], default=0.0), 1e-9)
     after = base.simulated.copy()
     effects, explained = [], 0.0
     verdict, alike = "nothing detectable", []
@@ -79,7 +80,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         global_test={
             "log_evidence": float(laws[ranked[0]][0]),
             "nulls": np.round(np.max([n for _, n, _ in laws.values()], 0), 3).tolist(),
-            "explainable": float(bend.gain),
+            "explainable": float(explainable(bend)),
         },
     )
     mismatch = Mismatch(
@@ -94,6 +95,11 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         phase=clip.phases(),
     )
     return diagnosis, physics(case, refits if verdict in ("named", "equivalence class") else []), mismatch
+
+
+def explainable(bend) -> float:
+    """chi square that a smooth field gains beyond what it gains where nothing is hidden."""
+    return max(bend.gain - calibration.SLACK, 0.0)
 
 
 def probabilities(laws: dict, refits: list, detected: bool) -> dict[str, float]:
@@ -133,29 +139,21 @@ def missing(clip) -> list[str]:
 
 def _effect(case, r, chances, laws, refits, number) -> dict:
     h: Hypothesis = r.finding.hypothesis
-    center, extent = place_of(laws[r.term][2]) if h.place is not None else (None, None)
-    if r.term == "tool_slip":
-        center, extent = np.array(h.place.center), h.place.extent
+    # Of a blob the radius at which it is down to a half; a grip's own radius.
+    reach = 1.0 if r.term == "tool_slip" else np.sqrt(2 * np.log(2))
     runners = [
         {"term": t, "probability": chances[t]} for t in sorted(chances, key=lambda t: -chances[t]) if t != r.term
     ]
     local = h.place is not None and h.place.normal is None
+    place: dict | str = "everywhere"
+    if local:
+        place = {"center": [float(c) for c in h.place.center], "extent": float(reach * h.place.extent), "unit": "m"}
+    heat = calibration.TEMPERATURE + calibration.MISFIT * max(r.gain, 0.0)
+    alone = float(expit((r.log_evidence - calibration.THRESHOLD) / heat))
     return {
         "term": r.term,
-        "probability": chances[r.term]
-        if number == 0
-        else float(
-            1
-            / (
-                1
-                + np.exp(
-                    -(r.log_evidence - calibration.THRESHOLD) / (calibration.TEMPERATURE + calibration.MISFIT * r.gain)
-                )
-            )
-        ),
-        "place": {"center": [float(c) for c in center], "extent": float(extent), "unit": "m"}
-        if local
-        else "everywhere",
+        "probability": chances[r.term] if number == 0 else alone,
+        "place": place,
         "time": {"onset": None if h.onset is None else float(h.onset), "end": None if h.end is None else float(h.end)},
         "parameters": described(h, r.amplitude, r.finding.spread, case.clip, case.base),
         "runners_up": runners[:RUNNERS],
@@ -163,17 +161,6 @@ def _effect(case, r, chances, laws, refits, number) -> dict:
         "log_evidence": float(r.log_evidence),
         "size": {"value": float(1e3 * r.finding.size), "unit": "mm"},
     }
-
-
-def place_of(findings) -> tuple[np.ndarray, float]:
-    """Mean centre [m] of the places near the best, by evidence, and the radius at which the law is down to a half."""
-    best = findings[0].hypothesis.place
-    logs = np.array([f.log_evidence for f in findings])
-    centers = np.array([f.hypothesis.place.center for f in findings])
-    near = np.linalg.norm(centers - best.center, axis=1) < 4 * best.extent
-    gain = max(findings[0].gain, 1.0)
-    share = np.where(near, np.exp((logs - logs.max()) / max(1.0, 0.02 * gain)), 0.0)
-    return share @ centers / share.sum(), float(np.sqrt(2 * np.log(2)) * best.extent)
 
 
 def _cos(case, a, b) -> float:

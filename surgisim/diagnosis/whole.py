@@ -1,5 +1,6 @@
 """What may be missing everywhere: a change of weight, breathing, strands, stiffening, pretension, contractions."""
 
+import itertools
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -14,6 +15,7 @@ from surgisim.physics.catalogue import choose
 ANGLES = 12
 PERIODS = (0.8, 1.0, 1.25, 1.6, 2.0)
 WAVES = (0.024, 0.045)
+PHASES = tuple(np.arange(6) * 2 * np.pi / 6)
 
 
 def bulk(clip: Clip, base: Base) -> Block:
@@ -29,14 +31,15 @@ def bulk(clip: Clip, base: Base) -> Block:
     return Block(columns, [h for h in found if h.mix.any()])
 
 
-def breathing(clip: Clip, base: Base) -> Block:
+def breathing(clip: Clip, base: Base, rates: np.ndarray | None = None) -> Block:
     """The held base moves."""
     near, at = base.tangent, knots(clip)
     loads = near.anchored(0).T
     states = near.at_states(np.broadcast_to(loads, (len(near.frames), *loads.shape)))
     columns = np.stack([near.over_time(states[:, d], bump) for d in range(3) for bump in hats(clip)])
     found, last = [], at[-1]
-    for rate in np.geomspace(max(0.18, 0.7 / last), 0.75, 14):
+    rates = np.geomspace(max(0.18, 0.7 / last), 0.75, 14) if rates is None else rates
+    for rate in rates:
         up = ease(at / 0.5)
         turn = 2 * np.pi * rate * at
         waves = [
@@ -57,18 +60,29 @@ def _by_states(base: Base, stress: Callable[[np.ndarray], np.ndarray]) -> np.nda
     return near.over_time(near.at_states(loads[:, None])[:, 0])
 
 
+def strands(clip: Clip, base: Base, turns: np.ndarray, grows: tuple[float, ...]) -> Block:
+    """Fibres along directions of the tissue's plane [rad], for exponents k2."""
+    law, (u, v) = choose(["fibre"])["fibre"], plane(clip)
+    columns, found = [], []
+    for turn in turns:
+        for k2 in grows:
+            a = np.cos(turn) * u + np.sin(turn) * v
+            row = {"k1": 1.0, "k2": k2, "x": a[0], "y": a[1], "z": a[2]}
+            columns.append(_by_states(base, lambda F, r=row: piola(law, F, r)))
+            found.append({"k2": k2, "axis": a, "turn": turn})
+    eye = np.eye(len(columns))
+    return Block(
+        np.stack(columns),
+        [Hypothesis("fibre", eye[:, n : n + 1], 1, None, None, None, about) for n, about in enumerate(found)],
+    )
+
+
 def everywhere(clip: Clip, base: Base) -> Block:
-    """Laws of the whole body without memory: strands, stiffening, pretension."""
-    laws, (u, v) = choose(["fibre", "stiffening", "pretension"]), plane(clip)
+    """Laws of the whole body without memory or direction of their own: stiffening, pretension."""
+    laws, (u, v) = choose(["stiffening", "pretension"]), plane(clip)
     columns, found = [], []
     columns.append(_by_states(base, lambda F: piola(laws["stiffening"], F, {"k": 1.0})))
     found.append(("stiffening", [0], 1, {}))
-    for turn in np.arange(ANGLES) * np.pi / ANGLES:
-        for k2 in (0.2,):
-            a = np.cos(turn) * u + np.sin(turn) * v
-            row = {"k1": 1.0, "k2": k2, "x": a[0], "y": a[1], "z": a[2]}
-            columns.append(_by_states(base, lambda F, r=row: piola(laws["fibre"], F, r)))
-            found.append(("fibre", [len(columns) - 1], 1, {"k2": k2, "axis": a}))
     first = len(columns)
     for turn in (0.0, np.pi / 3, 2 * np.pi / 3):
         a = np.cos(turn) * u + np.sin(turn) * v
@@ -79,34 +93,41 @@ def everywhere(clip: Clip, base: Base) -> Block:
     return Block(np.stack(columns), [Hypothesis(t, eye[:, k], s, None, None, None, a) for t, k, s, a in found])
 
 
-def contracting(clip: Clip, base: Base, angles: int = 6) -> Iterator[Block]:
-    """Waves of contraction along a direction of the tissue's plane."""
+def contracting(
+    clip: Clip, base: Base, turns: np.ndarray | None = None, waves=WAVES, periods=PERIODS, shifts=PHASES, starts=(0.0,)
+) -> Iterator[Block]:
+    """Waves of contraction along directions of the tissue's plane [rad], a block each.
+
+    waves: lengths [m]; periods [s]; shifts: phases [rad]; starts: when they set in [s].
+    """
     near, rest, (u, v) = base.tangent, base.prepared.simulator.rest, plane(clip)
     time = clip.time[: clip.until]
-    for turn in np.arange(2 * angles) * np.pi / angles:
+    turns = np.arange(ANGLES) * 2 * np.pi / ANGLES if turns is None else turns
+    for turn in turns:
         a = np.cos(turn) * u + np.sin(turn) * v
         axes = [near.gradient(f) @ a for f in near.frames]
         pull = [Fa[:, :, None] * a[None, None, :] for Fa in axes]
         columns, found = [], []
-        for wave in WAVES:
-            k = 2 * np.pi / (wave * scale(clip))
+        for wave in np.array(waves) * (scale(clip) if waves is WAVES else 1.0):
+            k = 2 * np.pi / wave
             phase = k * ((rest - rest.mean(0)) @ a)
             patterns = [np.ones(len(rest)), np.cos(phase), np.sin(phase), np.cos(2 * phase), np.sin(2 * phase)]
             loads = np.stack([near.of_stress(np.stack([p[:, None, None] * P for p in patterns])) for P in pull])
             states = near.at_states(loads)
-            for period in PERIODS:
-                for shift in np.arange(6) * 2 * np.pi / 6:
-                    turns = 2 * np.pi * time / period + shift
-                    courses = _wave(turns)
-                    up = ease(time / 0.3)
-                    signature = sum(near.over_time(states[:, m], up * courses[m]) for m in range(5))
-                    columns.append(signature)
-                    about = {"period": period, "wavelength": wave * scale(clip), "axis": a, "phase": shift}
-                    found.append(about)
+            for period, shift, start in itertools.product(periods, shifts, starts):
+                courses = _wave(2 * np.pi * time / period + shift)
+                up = ease((time - start) / 0.3)
+                columns.append(sum(near.over_time(states[:, m], up * courses[m]) for m in range(5)))
+                found.append(
+                    {"period": period, "wavelength": wave, "axis": a, "phase": shift, "turn": turn, "start": start}
+                )
         eye = np.eye(len(columns))
         yield Block(
             np.stack(columns),
-            [Hypothesis("active_contraction", eye[:, n : n + 1], 1, None, 0.0, None, b) for n, b in enumerate(found)],
+            [
+                Hypothesis("active_contraction", eye[:, n : n + 1], 1, None, b["start"], None, b)
+                for n, b in enumerate(found)
+            ],
         )
 
 

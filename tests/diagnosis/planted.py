@@ -47,7 +47,7 @@ def recording(values=None, places=None, seed=0, sigma=1.5e-4, grips=True) -> Rec
     prepared = clip.prepared(tuple(values))
     theta = prepared.theta(values, places or {})
     per_frame = prepared.per_frame_of(prepared.stiffest(theta), FPS, SAFETY)
-    drive = prepared.drive(motion, values, fps=FPS, per_frame=per_frame)
+    drive = prepared.drive(motion, values, fps=FPS, per_frame=per_frame, places=places or {})
     moved = carried(prepared.simulator.carry(rest), prepared.simulator.run(theta, drive))
     noise = Noise(level=np.full(len(rest), sigma), **NOISE).draw(rest, FRAMES, rng)
     points = rest[:, None] + moved + noise + 0.5 * sigma * rng.standard_normal((len(rest), 1, 3))

@@ -27,7 +27,7 @@ def simulated(clip, extra, place):
     prepared = clip.prepared(tuple(values))
     theta = prepared.theta(values, place)
     per_frame = prepared.per_frame_of(prepared.stiffest(theta), clip.fps, SAFETY)
-    drive = prepared.drive(clip.motion, values, fps=clip.fps, per_frame=per_frame)
+    drive = prepared.drive(clip.motion, values, fps=clip.fps, per_frame=per_frame, places=place)
     run = prepared.simulator.run(theta, drive, last=HELD + 1)
     return carried(prepared.simulator.carry(clip.rest), run)
 
