@@ -1,4 +1,4 @@
-"""A diagnosis on disk, surgisim-diagnosis/1: what physics was left out, in the fields that a reader needs.
+"""A diagnosis as it is read by whoever scores or shows it, whoever wrote it: format surgisim-diagnosis/1.
 
 More fields than these are welcome in the file; they are passed over.
 """
@@ -48,7 +48,7 @@ class Candidate:
     cos: float | None
     """Likeness of its signature to the named law's [1]."""
     held_out_rms: float | None
-    """Error on the frames held out once it is fitted, in the file's unit."""
+    """Error on the frames held out once it is fitted [mm]."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def _effect(raw: Any, where: str) -> Effect:
 def _candidate(raw: Any, where: str) -> Candidate:
     if not isinstance(raw, dict) or not isinstance(raw.get("term"), str):
         raise Problem(f"{where}: a law's name under 'term' is wanted. Diagnose anew.")
-    numbers = (raw.get(key) for key in ("log_evidence", "cos", "held_out_rms"))
+    numbers = (raw.get(key) for key in ("log_evidence", "cos", "held_out"))
     evidence, cos, rms = (None if x is None else float(x) for x in numbers)
     return Candidate(raw["term"], _place(raw.get("place"), where)[0], evidence, _probability(raw, where), cos, rms)
 

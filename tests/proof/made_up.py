@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from surgisim.artifacts.base import encoded
+from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.motion import Motion
 from surgisim.recordings.folder import write_recording
 from surgisim.recordings.mesh import Mesh
@@ -138,7 +140,7 @@ def diagnosis(name: str = "r-made", verdict: str = "named", effects: tuple | Non
         "unexplained_fraction": 0.12,
         "words": "The tissue gives way less over one place. A stiff lump there removes 84 % of the held-out error.",
         "ranking": [
-            {"term": t, "place": PLACE, "log_evidence": e, "probability": p, "cos": c, "held_out_rms": 5e-4}
+            {"term": t, "place": PLACE, "log_evidence": e, "probability": p, "cos": c, "held_out": 0.5}
             for t, e, p, c in RANKED
         ],
     }  # fmt: skip
@@ -152,19 +154,20 @@ def mismatch(made: Recording, extra: float, left: float = 0.1) -> bytes:
     grid = np.stack(np.meshgrid(*(np.linspace(0.002, h, n) for h, n in ((0.058, 20), (0.038, 14), (0.018, 7)))), -1)
     particles = grid.reshape(-1, 3)
     cause = np.exp(-((particles - PLACE["center"]) ** 2).sum(1) / (2 * 0.006**2))
-    phase = np.array(["rest"] * 4 + ["load"] * 4 + ["hold"] * 7 + ["released"] * 12 + ["load"] * 3 + ["hold"] * 5
-                     + ["released"] * 5)  # fmt: skip
+    phase = np.repeat([0, 1, 2, 3, 1, 2, 3], [4, 4, 7, 12, 3, 5, 5])
     z = np.linalg.norm(before, axis=-1) / 3e-4
-    return npz(
+    found = Mismatch(
         points=made.attached(),
         residual_before=before,
         residual_after=after,
         z=np.where(made.visible, z, np.nan),
+        significant=4.0,
         particles=particles,
         cause=cause,
         cause_time=way().sum(0),
         phase=phase,
     )
+    return encoded(found, producer="made up", settings={}, code="")
 
 
 def case(

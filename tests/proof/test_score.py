@@ -8,7 +8,8 @@ import pytest
 from proof import made_up
 from proof.made_up import diagnosis, effect, named
 
-from surgisim.artifacts.mismatch import read_mismatch
+from surgisim.artifacts.base import load
+from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.verdict import read_verdict
 from surgisim.problem import Problem
 from surgisim.proof.case import score
@@ -33,7 +34,7 @@ def unsealed(folder, **changed):
 
 def scored(folder, **case):
     made_up.case(folder, **case)
-    verdict, left = read_verdict(folder / "diagnosis.json"), read_mismatch(folder / "mismatch.npz")
+    verdict, left = read_verdict(folder / "diagnosis.json"), load(Mismatch, folder / "mismatch.npz")
     return score(unsealed(folder), read_recording(folder / "recording"), verdict, left, CELL)
 
 
@@ -150,10 +151,9 @@ def test_a_points_constant_offset_is_no_error_but_what_stays_after_a_pull_is():
 
 def test_a_diagnosis_of_fewer_points_is_scored_on_those(tmp_path):
     made_up.case(tmp_path, extra=3e-3)
-    left = read_mismatch(tmp_path / "mismatch.npz")
-    few = dataclasses.replace(
-        left, points=left.points[3:], residual_before=left.residual_before[3:], residual_after=left.residual_after[3:]
-    )
+    left = load(Mismatch, tmp_path / "mismatch.npz")
+    names = ("points", "residual_before", "residual_after", "z")
+    few = dataclasses.replace(left, **{name: getattr(left, name)[3:] for name in names})
     verdict, recording = read_verdict(tmp_path / "diagnosis.json"), read_recording(tmp_path / "recording")
     some, whole = (score(unsealed(tmp_path), recording, verdict, m, CELL)["held_out"] for m in (few, left))
     assert some["oracle"] != whole["oracle"]

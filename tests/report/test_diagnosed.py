@@ -6,13 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from proof import made_up
 from proof.made_up import diagnosis, named
 from report.browser import Browser, installed
 
-from surgisim.artifacts.mismatch import read_mismatch
 from surgisim.artifacts.verdict import Effect
 from surgisim.physics.catalogue import catalogue
 from surgisim.problem import Problem
@@ -108,31 +106,6 @@ def test_every_law_can_be_shown_from_its_own_file(name):
 def test_files_of_two_diagnoses_are_not_shown_together(tmp_path):
     with pytest.raises(Problem, match="Pass files of one diagnosis"):
         shown(tmp_path, diagnosis("r-other"))
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda a: a.pop("cause"), "lacks \\['cause'\\]"),
-        (lambda a: a.update(z=a["z"][1:]), "'z' is"),
-        (lambda a: a.update(phase=np.array(["sleep"] * 40)), "'phase' holds \\['sleep'\\]"),
-    ],
-)
-def test_a_mismatch_of_another_shape_is_refused(tmp_path, change, words):
-    made_up.case(tmp_path)
-    arrays = dict(np.load(tmp_path / "mismatch.npz"))
-    change(arrays)
-    np.savez(tmp_path / "mismatch.npz", **arrays)
-    with pytest.raises(Problem, match=words):
-        read_mismatch(tmp_path / "mismatch.npz")
-
-
-def test_phases_may_be_numbers(tmp_path):
-    made_up.case(tmp_path)
-    arrays = dict(np.load(tmp_path / "mismatch.npz"))
-    arrays["phase"] = np.arange(40) % 4
-    np.savez(tmp_path / "mismatch.npz", **arrays)
-    assert read_mismatch(tmp_path / "mismatch.npz").phase[:4].tolist() == ["rest", "load", "hold", "released"]
 
 
 @pytest.mark.slow

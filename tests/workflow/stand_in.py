@@ -4,12 +4,12 @@ reads   a recording folder
 writes  diagnosis.json, physics.json, mismatch.npz
 """
 
-import io
 import json
 import os
 
 import numpy as np
 
+from surgisim.artifacts.mismatch import Mismatch
 from surgisim.config.base import Settings
 from surgisim.recordings.folder import read_recording
 from surgisim.stage import Bytes, Source, stage
@@ -20,11 +20,11 @@ class Anything(Settings):
 
 
 @stage(
-    reads={"recording": Source("a recording folder"), "base": Source("physics.json of the base", required=False)},
-    writes={"diagnosis": Bytes(".json"), "physics": Bytes(".json"), "mismatch": Bytes(".npz"), "cloud": Bytes(".ply")},
+    reads={"recording": Source("a recording folder"), "work": Source("finished runs", required=False)},
+    writes={"diagnosis": Bytes(".json"), "physics": Bytes(".json"), "mismatch": Mismatch, "cloud": Bytes(".ply")},
     settings=Anything,
 )
-def main(recording, base, *, settings, progress):
+def main(recording, work, *, settings, progress):
     # What a diagnosis must never do: say whether it could see the answer.
     seen = sorted(str(p) for p in recording.parent.rglob("*") if "truth" in p.name and str(recording) in str(p.parent))
     assert not seen, seen
@@ -41,20 +41,19 @@ def main(recording, base, *, settings, progress):
         "effects": [{"term": os.environ.get("STAND_IN", "fibre"), "probability": 0.7, "place": place}],
         "words": "Something was left out. Nobody looked what.",
     }
-    arrays = {
-        "points": rest,
-        "residual_before": left,
-        "residual_after": 0.5 * left,
-        "z": z,
-        "particles": particles,
-        "cause": particles[:, 0] - particles[:, 0].min(),
-        "cause_time": np.nan_to_num(np.nanmean(z, axis=0)),
-        "phase": np.array(["rest"] * clip.frames),
-    }
-    stream = io.BytesIO()
-    np.savez(stream, **arrays)
+    found = Mismatch(
+        points=rest,
+        residual_before=left,
+        residual_after=0.5 * left,
+        z=z,
+        significant=4.0,
+        particles=particles,
+        cause=particles[:, 0] - particles[:, 0].min(),
+        cause_time=np.nan_to_num(np.nanmean(z, axis=0)),
+        phase=np.zeros(clip.frames, int),
+    )
     physics = {"terms": {}, "grid": {"spacing": 0.004, "step": 1e-4}}
-    return json.dumps(told).encode(), json.dumps(physics).encode(), stream.getvalue(), b"ply\n"
+    return json.dumps(told).encode(), json.dumps(physics).encode(), found, b"ply"
 
 
 if __name__ == "__main__":

@@ -148,7 +148,7 @@ rule diagnosis:
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
         " --recording {params.recording} --diagnosis {output.diagnosis} --physics {output.physics}"
-        " --mismatch {output.mismatch} --cloud {output.cloud}"
+        " --mismatch {output.mismatch} --cloud {output.cloud} --work blind/{wildcards.seed}/{wildcards.case}/{wildcards.way}/work"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 

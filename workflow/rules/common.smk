@@ -128,10 +128,10 @@ FILES = (
 # Ways to diagnose the same cases: the method; the same with one of its parts left out, to see what each is worth; the
 # method on clips that end sooner; and on paths that belong to another case, which must bring naming down to chance.
 ABLATIONS = {
-    "iid": {"whitened": False},
-    "no_offset": {"offset": False},
-    "no_nulls": {"nulls": 0},
-    "no_cause": {"cause": False},
+    "iid": {"noise": "independent"},
+    "no_offset": {"offsets": False},
+    "no_nulls": {"calibrated": False},
+    "no_model_error": {"model_error": 0.0},
 }
 SHORTER = {"until_load": "load", "until_hold": "hold"}
 WAYS = {"main": {}, "shuffled": {}, **dict.fromkeys(SHORTER, {}), **ABLATIONS}

@@ -34,9 +34,6 @@ rule known:
 rule known_diagnosis:
     input:
         recording=expand("known/{{known}}/recording/{name}", name=FILES),
-        base=lambda w: (
-            f"known/{KNOWN[w.known].base}/physics.json" if KNOWN[w.known].base else []
-        ),
     output:
         diagnosis="known/{known}/diagnosis.json",
         physics="known/{known}/physics.json",
@@ -54,15 +51,14 @@ rule known_diagnosis:
         gpu=0,
     params:
         recording=folder,
-        base=lambda w, input: f"--base {input.base}" if input.base else "",
         settings=lambda w: json.dumps(
             {**config.get("diagnosis", {}), **KNOWN[w.known].settings}
         ),
         code=code("diagnosis"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
-        " --recording {params.recording} {params.base} --diagnosis {output.diagnosis} --physics {output.physics}"
-        " --mismatch {output.mismatch} --cloud {output.cloud}"
+        " --recording {params.recording} --diagnosis {output.diagnosis} --physics {output.physics}"
+        " --mismatch {output.mismatch} --cloud {output.cloud} --work known/{wildcards.known}/work"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 

@@ -21,6 +21,12 @@ def convert(folder: Path):
     return carried(folder / "beam_load52_V2_a.c3d")
 
 
+def direct(folder: Path, progress) -> Found:
+    from surgisim.proof.rigs.swinging_beam import concealed_load
+
+    return concealed_load(folder, progress)
+
+
 def ask(folder: Path, found: Found) -> list[Answer]:
     answers = [named(found.verdict, LOADS, "an added mass or a load")]
     load = next((e for e in found.verdict.effects if e.term in LOADS), None)
@@ -54,6 +60,6 @@ KNOWN = Known(
     data="silicone_beam_mocap",
     concealed="52 g hang on the free end. The base is the bare beam's, fitted on another take.",
     convert=convert,
+    direct=direct,
     ask=ask,
-    base="beam_damping",
 )

@@ -45,13 +45,11 @@ class Known:
     convert: Callable[[Path], Any] | None = None
     """The `Recording` that is diagnosed, from the folder of the data."""
     direct: Callable[[Path, Callable[..., None]], Found] | None = None
-    """What is found, where the data are no tracks: from the folder of the data; the second argument is progress."""
+    """What is found, where the diagnosis of pulled tissue does not apply: from the folder of the data, and progress."""
     ask: Callable[[Path, Found], list[Answer]]
     """The questions, from the folder of the data and what was found."""
-    base: str | None = None
-    """Name of the known recording whose laws and numbers are the base, if it is not fitted here."""
     settings: Mapping[str, Any] = field(default_factory=dict)
-    """What the diagnosis is told beside its defaults: which base, which laws it may not use."""
+    """What the diagnosis is told beside its defaults."""
 
 
 def catalogue() -> dict[str, Known]:

@@ -11,7 +11,7 @@ WORDS = {
     "iid": "residuals taken as independent",
     "no_offset": "no reference offset of the points",
     "no_nulls": "no calibration on nulls",
-    "no_cause": "no map of the cause",
+    "no_model_error": "no error of the simulator itself",
     "until_load": "fitted until the load ends",
     "until_hold": "fitted until the hold ends",
     "shuffled": "another case's paths",

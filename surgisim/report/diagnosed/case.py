@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from surgisim.artifacts.mismatch import Mismatch, read_mismatch
+from surgisim.artifacts.base import load
+from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.verdict import Verdict, read_verdict
 from surgisim.problem import Problem
 from surgisim.recordings.folder import read_recording
@@ -31,6 +32,11 @@ class Diagnosed:
         return np.arange(self.recording.frames) / self.recording.fps
 
     @property
+    def phase(self) -> np.ndarray:
+        """What goes on in each frame, (T,) words."""
+        return np.array(("rest", "load", "hold", "released"))[self.mismatch.phase]
+
+    @property
     def split(self) -> np.ndarray:
         """0 where a frame could be fitted, 2 where it was held out, (T,)."""
         held = np.zeros(self.recording.frames, int)
@@ -50,7 +56,7 @@ class Diagnosed:
 
 def read(recording: Path, diagnosis: Path, mismatch: Path, physics: Path) -> Diagnosed:
     """Everything that the page shows. Raises Problem for files that are not of one diagnosis."""
-    clip, verdict, left = read_recording(recording), read_verdict(diagnosis), read_mismatch(mismatch)
+    clip, verdict, left = read_recording(recording), read_verdict(diagnosis), load(Mismatch, mismatch)
     if verdict.recording != clip.name or len(left.phase) != clip.frames:
         raise Problem(
             f"{diagnosis}: is of recording {verdict.recording} with {len(left.phase)} frames in {mismatch.name}, but "

@@ -18,7 +18,7 @@ def mismatch(case: Diagnosed) -> str:
     floor = case.verdict.fit.get("noise_floor")
     level = None if floor is None else (floor, "noise floor")
     return over_time(
-        lines, "recorded minus simulated, RMS [mm]", case.time, left.phase, case.split, from_zero=True, level=level
+        lines, "recorded minus simulated, RMS [mm]", case.time, case.phase, case.split, from_zero=True, level=level
     )
 
 
@@ -29,7 +29,7 @@ def symptom_and_cause(case: Diagnosed) -> str:
         z = np.sqrt(np.nanmean(left.z**2, axis=0))
     with sheet() as figure:
         axes = figure.subplots()
-        shade_phases(axes, case.time, left.phase)
+        shade_phases(axes, case.time, case.phase)
         for values, color, name in ((z, RECONSTRUCTION, "symptom"), (np.abs(left.cause_time), WRONG, "cause")):
             top = float(np.nanmax(values, initial=0.0))
             if top > 0:
