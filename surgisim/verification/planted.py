@@ -39,7 +39,7 @@ SEEDS, SPACING, EDGE = tuple(range(101, 109)), 4e-3, 2e-3
 """Seeds, spacing of the grid and edges of the finite elements [m]."""
 CALIBRATION = tuple(range(109, 113))
 """Seeds of the scenes on which the solvers' difference is measured."""
-AFTER = 14
+AFTER = 10
 """Frames after the release that are looked at."""
 ELASTIC = "neo_hookean_ciarlet"
 WITHIN = {"ratio": 0.15, "eta_over_E": 0.20, "nu": 0.02}

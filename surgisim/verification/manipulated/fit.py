@@ -7,7 +7,7 @@ import numpy as np
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.observation import Observation, phases
-from surgisim.estimation.rounds import descend, search_softly
+from surgisim.estimation.rounds import choose_start, descend
 from surgisim.estimation.search import search
 from surgisim.estimation.trial import WORKERS, Trial, at_once
 from surgisim.mpm.setup import Values, prepare
@@ -24,7 +24,7 @@ MODEL = 0.1
 """Standard deviation granted to the difference between the two solvers, as a share of how far a point has gone. It is
 twice what `manipulation` finds, because it is alike over many points and frames, and so counts for more than noise."""
 COARSER = 1.5
-"""How many times coarser the grid is on which a search begins."""
+"""How many times coarser the grid is on which a start is chosen."""
 SOFT = 1.5e-3
 """Width over which one region passes into the other [m]."""
 
@@ -81,13 +81,12 @@ def fitted(
 ) -> tuple[Trial, Solution]:
     """The laws' parameters from the tracks `seen` (T, K, 3) of the scene's probes at frames 1 to `last`.
 
-    Searched on a grid COARSER times as wide first, from a few starts; the last step is taken on the grid itself.
+    The best of a few starts is chosen on a grid COARSER times as wide, where a grip may be too wide to fit more.
     """
     rough, fine = (trial(scene, h, seen, split, last, noise=noise, seed=seed) for h in (COARSER * spacing, spacing))
-    phase, many, few = phases(fine.motion, fine.frames), *(Estimation(iterations=n, first_window=1.0) for n in (5, 1))
-    rough, near = search_softly(rough, phase, many, [], lambda *_: None)
-    fine = replace(fine, grip=rough.grip)
-    return fine, descend(fine, near.x, phase, few, [], lambda *_: None)
+    phase, settings = phases(fine.motion, fine.frames), Estimation(iterations=6, first_window=1.0)
+    begin = choose_start(rough, [], lambda *_: None)
+    return fine, descend(fine, begin, phase, settings, [], lambda *_: None)
 
 
 def mistaken(at_truth: Trial) -> np.ndarray:
