@@ -37,7 +37,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
             explained = min((first.gain + second[0].gain) / total, 1.0)
         alike = [r for r in refits[1:] if _cos(case, first, r) > calibration.ALIKE and chances[r.term] > 0.1]
         verdict = "named"
-        if explained < calibration.EXPLAINED:
+        if explained < calibration.EXPLAINED or first.log_evidence < calibration.THRESHOLD:
             verdict = "unexplained"
         elif alike and chances[first.term] < calibration.SURE:
             verdict = "equivalence class"
