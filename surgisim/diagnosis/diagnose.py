@@ -152,7 +152,7 @@ def threshold(laws: dict, settings: Diagnosing) -> float:
     return max(calibration.THRESHOLD, float(np.quantile(highest, 0.95)))
 
 
-def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: int = 2) -> Refit:
+def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: int = 3) -> Refit:
     """The law in the engine, its strength by secants of its response; what the tangent left out is put back.
 
     Where the engine breaks down, a weaker law is tried once, then the tangent's word is taken.
@@ -170,7 +170,7 @@ def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: 
         G, b = float(case.space.gram(white, white)[0, 0]), float(case.space.gram(white, z[:, None])[0, 0])
         best = b / max(G, 1e-12)
         # Near its best strength a response may be scaled; far from it, only another run tells.
-        scale = float(np.clip(best, 0.7, 1.4))
+        scale = float(np.clip(best, 0.3, 1.4))
         mine = 2 * scale * b - scale**2 * G
         if mine > gain:
             gain, response, kept = mine, scale * change, scale * amplitude

@@ -46,7 +46,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         effects = [_effect(case, r, chances, laws, refits, n) for n, r in enumerate(accepted)]
         if verdict == "unexplained":
             for effect in effects:
-                effect["probability"] = min(effect["probability"], explained / 2)
+                effect["probability"] = min(effect["probability"], float(np.clip(explained / 2, 0.0, 0.5)))
     placebo = _placebo(case, refits, laws, rng) if detected else base.simulated
     fit, held_out = errors(case, after, placebo)
     z, reach = symptom(clip, case.noise, residual(case, base.simulated, False), rng)
