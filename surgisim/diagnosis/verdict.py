@@ -32,7 +32,9 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         first = refits[0]
         explained = first.gain / total
         accepted = [first]
-        if second is not None and second[0].gain > calibration.SECOND * total:
+        # What the first law's signature has wrong must not pass for a second law.
+        least = calibration.THRESHOLD + calibration.MISFIT * first.gain
+        if second is not None and second[0].gain > calibration.SECOND * total and second[1] > least:
             accepted.append(second[0])
             explained = min((first.gain + second[0].gain) / total, 1.0)
         alike = [r for r in refits[1:] if _cos(case, first, r) > calibration.ALIKE and chances[r.term] > 0.1]
