@@ -1,7 +1,7 @@
 """Put a clip that went through the graph into a recording folder, for the diagnosis.
 
 reads   body.npz, material.npz, physics.json, tracks.npz, motion.npz, frames.npz, camera.json
-writes  recording.json, rest.ply, fixed.json, grip.npz, tracks.npz, split.json (empty where no frames are held out)
+writes  recording.json, rest.ply, fixed.json, grip.npz, tracks.npz, split.json
 """
 
 from surgisim.artifacts.body import Body

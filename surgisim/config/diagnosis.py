@@ -18,7 +18,7 @@ class Diagnosing(Settings):
     """Residuals of nothing but noise that go through the same search [1]."""
     refine: int = Field(4, ge=1, le=16)
     """Laws that the engine itself runs again, best first [1]."""
-    polish: int = Field(2, ge=0, le=16)
+    free: int = Field(1, ge=0, le=16)
     """Of them, laws that are fitted with place, time and form free [1]."""
     second: bool = True
     """Whether a second effect is looked for [1]."""

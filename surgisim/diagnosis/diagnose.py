@@ -85,9 +85,9 @@ def diagnose(
             fine, evidence = sharpened(case, laws[term], case.z)
             refits.append(refit(case, fine, evidence, case.z))
         refits.sort(key=lambda r: -r.log_evidence)
-        for n, one in enumerate(refits[: settings.polish]):
-            done = 0.75 + 0.1 * n / settings.polish
-            refits[n] = polished(case, one, case.z, lambda text, done=done: progress(done, 1, text))
+        for n, one in enumerate(refits[: settings.free]):
+            done = 0.75 + 0.1 * n / settings.free
+            refits[n] = freed(case, one, case.z, lambda text, done=done: progress(done, 1, text))
         refits.sort(key=lambda r: -r.log_evidence)
     second = None
     if detected and settings.second and refits[0].gain < calibration.EXPLAINED_WELL * verdict.explainable(bend):
@@ -174,7 +174,7 @@ def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: 
     return Refit(finding, kept, response, gain, evidence + 0.5 * (gain - finding.gain))
 
 
-def polished(case: Case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
+def freed(case: Case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
     """The same law with everything about it free; as it was where that gains nothing."""
     start = one.finding.hypothesis, one.amplitude
     found = refined(case.clip, case.base, case.whiten, case.space, case.memo, z, start, say)

@@ -104,10 +104,8 @@ def refined(
     except Breakdown:
         return None
     sd = np.sqrt(np.diag(np.linalg.inv(normal)))
-    shifts = [
-        _turned(h, amplitude, knobs, x + s * e, clip)[1] - strength for s, e in zip(sd, np.eye(len(x)), strict=True)
-    ]
-    return Refined(turned, strength, np.sqrt(np.sum(np.square(shifts), 0)), response, nothing - best)
+    off = [_turned(h, amplitude, knobs, x + side, clip)[1] - strength for side in np.diag(sd)]
+    return Refined(turned, strength, np.sqrt(np.sum(np.square(off), 0)), response, nothing - best)
 
 
 def _knobs(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> list[tuple[str, object, float]]:
@@ -124,16 +122,11 @@ def _knobs(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> list[tuple[str, 
         else:
             knobs.append(("depth", None, 0.5 * APART * scale(clip)))
     moving = h.term in ("hidden_contact", "added_mass", "gravity", "tool_slip")
-    knobs += [
-        (name, None, MOMENT)
-        for name in ("onset", "end")
-        if moving and getattr(h, name) is not None and not (h.term == "tool_slip" and name == "end")
-    ]
-    knobs += [
-        ("logarithm", key, sd)
-        for key, sd in LOGARITHMS.items()
-        if key in h.about and h.about[key] > 0 and not _unit(h, key)
-    ]
+    names = ("onset",) if h.term == "tool_slip" else ("onset", "end")
+    knobs += [(name, None, MOMENT) for name in names if moving and getattr(h, name) is not None]
+    # Damage has a rate of one, which its amplitude scales.
+    free = {k: sd for k, sd in LOGARITHMS.items() if (h.term, k) != ("damage", "rate")}
+    knobs += [("logarithm", key, sd) for key, sd in free.items() if h.about.get(key, 0) > 0]
     if "axis" in h.about:
         knobs.append(("turn", "axis", TURN))
     if "phase" in h.about:
@@ -141,11 +134,6 @@ def _knobs(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> list[tuple[str, 
     if "slack" in h.about:
         knobs.append(("slack", "slack", SLACK))
     return knobs
-
-
-def _unit(h: Hypothesis, key: str) -> bool:
-    """Whether the number only scales the amplitude's unit."""
-    return h.term == "damage" and key == "rate"
 
 
 def _turned(h: Hypothesis, amplitude: np.ndarray, knobs, x: np.ndarray, clip: Clip) -> tuple[Hypothesis, np.ndarray]:

@@ -20,18 +20,20 @@ def identifiability(
     density: float,
     length: float,
     independent: float,
+    model: np.ndarray | None = None,
 ) -> dict:
     """Parameters and groups with 90 % intervals, the share of information from each phase, and whether told.
 
     phase_of: phase of every residual, (R,). length: thickness of the body [m].
     independent: share of the residuals that count as independent, because tracking noise is
     correlated along a track and between neighbours; the misfit's own size scales the noise.
+    model: covariance of the error that the simulation itself makes in the parameters, in search space, (M, M).
     """
     J, r, spread = solution.jacobian, solution.residual, search.spread
     used = r != 0
     scale = max(1.0, float(np.mean(r[used] ** 2))) if used.any() else 1.0
     information = independent / scale * (J.T @ J)
-    covariance = np.linalg.inv(information + np.diag(1 / spread**2))
+    covariance = np.linalg.inv(information + np.diag(1 / spread**2)) + (0.0 if model is None else model)
     result = {}
     for name, direction, value, unit, logarithmic in _quantities(search, solution.x, density, length):
         sd = float(np.sqrt(direction @ covariance @ direction))

@@ -17,6 +17,8 @@ from surgisim.recordings.recording import Recording
 
 FINE = 0.5
 """Width of a voxel of the body's surface over the body's spacing."""
+FITTED = 0.7
+"""Share of the frames that are fitted where none were held out after them."""
 MARGIN = 4
 """Empty voxels around the body."""
 
@@ -40,7 +42,8 @@ def recording_of(
     sigma = np.sqrt(np.nanmedian((2 * across**2 + along**2) / 3, axis=1))
     after = np.flatnonzero(frames.split == AFTER)
     total = len(frames.split)
-    split = {"fit": (0, int(after[0])), "held_out": (int(after[0]), total)} if len(after) else None
+    until = int(after[0]) if len(after) else round(FITTED * total)
+    split = {"fit": (0, until), "held_out": (until, total)}
     return Recording(
         name=name,
         fps=camera.fps,
@@ -60,7 +63,7 @@ def recording_of(
 def surface(body: Body) -> Mesh:
     """The closed surface on which half of a voxel's worth of tissue lies within a voxel's reach."""
     width = FINE * body.spacing
-    low = body.rest.min(0).astype(float) - MARGIN * width
+    low = body.rest.min(0).astype(float) - (MARGIN + 0.5) * width
     at = (body.rest.astype(float) - low) / width
     shape = np.ceil(at.max(0)).astype(int) + MARGIN
     edges = [np.arange(n + 1) for n in shape]
@@ -72,9 +75,10 @@ def surface(body: Body) -> Mesh:
 
 
 def held_boxes(body: Body, held: np.ndarray) -> np.ndarray:
-    """Cells of the body's spacing in which most particles are held, joined along z [m], (B, 2, 3)."""
-    low = body.rest.min(0).astype(float)
-    cell = np.floor((body.rest - low) / body.spacing).astype(int)
+    """Voxels in which most particles are held, joined along z [m], (B, 2, 3)."""
+    width = FINE * body.spacing
+    low = body.rest.min(0).astype(float) - 0.5 * width
+    cell = np.floor((body.rest - low) / width).astype(int)
     shape = tuple(cell.max(0) + 1)
     flat = np.ravel_multi_index(cell.T, shape)
     count = np.bincount(flat, minlength=np.prod(shape))
@@ -82,4 +86,4 @@ def held_boxes(body: Body, held: np.ndarray) -> np.ndarray:
     steps = np.diff(np.pad(mostly.astype(int), ((0, 0), (0, 0), (1, 1))), axis=2)
     begin, end = np.argwhere(steps == 1), np.argwhere(steps == -1)
     corner = np.stack([begin, np.concatenate([end[:, :2] + 1, end[:, 2:]], 1)], 1)
-    return low + corner * body.spacing
+    return low + corner * width

@@ -16,7 +16,7 @@ from surgisim.verification.markdown import table
 
 TITLE = "A second manipulation, predicted"
 
-SEEDS, SPACING, EDGE = tuple(range(201, 209)), 4e-3, 2e-3
+SEEDS, SPACING, EDGE = tuple(range(201, 209)), 5e-3, 2e-3
 NOISE, BOUND = 3e-4, 1.5
 """Noise of each coordinate [m], that of the tracks tier; error over noise floor that is allowed."""
 

@@ -19,6 +19,7 @@ EDGES = (0.0, 0.7, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 6.0, 12.0)
 """Rings around the grip, in its radii."""
 DIRECTIONS = 8
 MODES = 3
+LONGEST = 10.0
 
 
 def model_error(scenes: list[Scene], differences: list[np.ndarray]) -> dict:
@@ -144,10 +145,14 @@ def _ring_size(s, frame, ring) -> float:
 
 
 def _fall(apart, product, edges) -> float:
-    """Scale of exp(-apart / scale), by least squares on the logarithm of binned correlations above 0.1."""
+    """Scale of exp(-apart / scale), by least squares on the logarithm of binned correlations above 0.1.
+
+    At most LONGEST times what was looked at: what never falls there has no scale that could be told.
+    """
     which = np.digitize(apart, edges) - 1
     bins = [(apart[which == k].mean(), product[which == k].mean()) for k in range(len(edges) - 1) if (which == k).any()]
     kept = np.array([(a, c) for a, c in bins[1:] if c > 0.1])
     if not len(kept):
         return float(edges[1])
-    return float(-(kept[:, 0] @ kept[:, 0]) / min(-1e-12, kept[:, 0] @ np.log(np.minimum(kept[:, 1], 1.0))))
+    fall = -(kept[:, 0] @ np.log(np.minimum(kept[:, 1], 1.0))) / (kept[:, 0] @ kept[:, 0])
+    return float(1 / max(fall, 1 / (LONGEST * edges[-1])))

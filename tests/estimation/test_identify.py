@@ -1,0 +1,37 @@
+"""What a fit says it can tell."""
+
+import numpy as np
+import pytest
+
+from surgisim.estimation.gauss_newton import Solution
+from surgisim.estimation.identify import identifiability
+from surgisim.estimation.search import search
+
+
+def told(model=None):
+    """The table of a fit whose residuals tell every parameter to a hundredth of its search space."""
+    wanted = search(["corotated", "newtonian"], {}, [])
+    slope = np.vstack([100 * np.eye(3)] * 50)
+    solution = Solution(wanted.start, np.full(len(slope), 0.5), slope)
+    phase = np.zeros(len(slope), int)
+    return identifiability(
+        solution, wanted, phase_of=phase, phase_names=("load",), density=1050.0, length=0.015, independent=0.02,
+        model=model,
+    )  # fmt: skip
+
+
+def width(q):
+    return np.log(q["high"] / q["low"]) / 2 / 1.645
+
+
+def test_the_simulations_own_error_belongs_to_every_interval():
+    error = np.diag([0.03, 0.0, 0.04]) ** 2
+    alone, both = told(), told(error)
+    for name, own in (("corotated.E", 0.03), ("newtonian.eta", 0.04), ("newtonian.eta / corotated.E", 0.05)):
+        assert width(both[name]) == pytest.approx(np.hypot(width(alone[name]), own), rel=1e-9)
+    assert both["corotated.nu"] == alone["corotated.nu"]
+
+
+def test_what_the_simulation_itself_gets_wrong_by_much_is_not_told():
+    assert told()["corotated.E"]["told"]
+    assert not told(np.diag([0.5, 0.0, 0.0]) ** 2)["corotated.E"]["told"]
