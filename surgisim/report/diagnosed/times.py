@@ -27,10 +27,11 @@ def symptom_and_cause(case: Diagnosed) -> str:
     left = case.mismatch
     with np.errstate(invalid="ignore"):
         z = np.sqrt(np.nanmean(left.z**2, axis=0))
+    cause = np.where(case.split == 0, np.abs(left.cause_time), np.nan)
     with sheet() as figure:
         axes = figure.subplots()
         shade_phases(axes, case.time, case.phase)
-        for values, color, name in ((z, RECONSTRUCTION, "symptom"), (np.abs(left.cause_time), WRONG, "cause")):
+        for values, color, name in ((z, RECONSTRUCTION, "symptom"), (cause, WRONG, "cause")):
             top = float(np.nanmax(values, initial=0.0))
             if top > 0:
                 axes.plot(case.time, values / top, color=color, label=name)
@@ -65,6 +66,8 @@ def bars(case: Diagnosed) -> str | None:
     if not groups:
         return None
     shown = [b for b in BARS if any(b[0] in errors for _, errors in groups)]
+    if not case.verdict.names:
+        shown = [(key, "law that comes nearest" if key == "after" else words, c) for key, words, c in shown]
     with sheet(6.0 * len(groups), 0.9 + 0.34 * len(shown)) as figure:
         for axes, (name, errors) in zip(
             figure.subplots(1, len(groups), squeeze=False, sharex=True)[0], groups, strict=True
