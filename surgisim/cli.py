@@ -110,6 +110,20 @@ def demo(
 
 
 @app.command()
+def diagnose(
+    recording: Annotated[Path, typer.Argument(help="A recording folder (docs/diagnosis.md).")],
+    out: Annotated[Path, typer.Option(help="Folder for diagnosis.json, physics.json, mismatch.npz and mismatch.ply.")],
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A setting; repeatable.")] = None,
+    debug: Debug = False,
+) -> None:
+    """Say what physics a recording's simulation lacks, and how surely; a second start goes on where one stopped."""
+    from surgisim.diagnosis.files import carry_out
+
+    with plain_errors(debug):
+        typer.echo(carry_out(recording, out, tuple(set_ or ())))
+
+
+@app.command()
 def doctor(config: Config = None, debug: Debug = False) -> None:
     """Say what this machine has, and what that means for a run."""
     from surgisim.doctor import examine

@@ -35,9 +35,9 @@ class Maybe:
 
 @dataclass(frozen=True)
 class Several:
-    """One or more files of a kind: the function gets a list."""
+    """One or more files of a kind: the function gets a list, of paths where the kind is a Source."""
 
-    kind: type[Artifact]
+    kind: "type[Artifact] | Source"
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def _read(kind: Any, path: Any) -> Any:
     if isinstance(kind, Source):
         return path
     if isinstance(kind, Several):
-        return [load(kind.kind, each) for each in path]
+        return [_read(kind.kind, each) for each in path]
     if isinstance(kind, Maybe):
         return None if path is None else load(kind.kind, path)
     return load(kind, path)
@@ -176,5 +176,6 @@ def _wanted(kind: Any) -> str:
         return kind.wanted
     if isinstance(kind, Bytes):
         return f"a {kind.suffix} file"
-    kind = kind.kind if isinstance(kind, Maybe | Several) else kind
+    if isinstance(kind, Maybe | Several):
+        return _wanted(kind.kind)
     return f"{kind.__name__} ({kind.SUFFIX}): {(kind.__doc__ or '').strip().splitlines()[0]}"

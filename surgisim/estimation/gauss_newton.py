@@ -37,21 +37,26 @@ def gauss_newton(
     iterations: int,
     workers: int,
     said: Callable[[int, np.ndarray, float], None] = lambda *_: None,
+    together: Callable[[list[np.ndarray]], list[np.ndarray | None]] | None = None,
 ) -> Solution:
     """Minimise share sum huber(r(x)) + sum ((x - prior) / spread)^2 by Levenberg-Marquardt.
 
     share: part of the residuals that counts as independent.
 
     residual(x, worker) may be called from `workers` threads at once, each with its own number; it
-    returns None where x cannot be simulated, which only a trial step may meet.
+    returns None where x cannot be simulated, which only a trial step may meet. together(xs) gives the residuals of
+    several x at once, where that is quicker.
     Nocedal and Wright, Numerical optimization, 2nd ed. (2006), section 10.3.
     """
     low, high = bounds
     damping = 1e-2
 
+    def all_of(xs: list[np.ndarray]) -> list[np.ndarray | None]:
+        return together(xs) if together else at_once(residual, xs, workers)
+
     def jacobian_at(x: np.ndarray, r: np.ndarray) -> np.ndarray:
         side = np.where(x + DIFFERENCE <= high, 1.0, -1.0) * DIFFERENCE
-        shifted = at_once(residual, [x + side[m] * np.eye(len(x))[m] for m in range(len(x))], workers)
+        shifted = all_of([x + side[m] * np.eye(len(x))[m] for m in range(len(x))])
         for m in [m for m, s in enumerate(shifted) if s is None]:
             side[m] = -side[m]
             shifted[m] = residual(np.clip(x + side[m] * np.eye(len(x))[m], low, high), 0)
@@ -80,7 +85,7 @@ def gauss_newton(
         best = None
         for pair in ((0.1, 1.0), (10.0, 100.0)):
             trials = [np.clip(x - np.linalg.solve(H + f * damping * np.diag(np.diag(H)), g), low, high) for f in pair]
-            results = at_once(residual, trials, workers)
+            results = all_of(trials)
             costs = [cost_of(q, t) for q, t in zip(results, trials, strict=True)]
             k = int(np.argmin(costs))
             if costs[k] < cost:

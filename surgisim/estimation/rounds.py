@@ -86,7 +86,7 @@ def choose_start(trial: Trial, history: list, say: Say) -> np.ndarray:
     """
     wanted, points = trial.wanted, trial.wanted.starts()
     say(0.1, 1.0, f"trying {len(points)} starts")
-    results = at_once(lambda x, worker: trial.residual(x, worker), points)
+    results = trial.together(points)
     costs = [
         np.inf if r is None else INDEPENDENT * misfit(r) + float((((x - wanted.start) / wanted.spread) ** 2).sum())
         for r, x in zip(results, points, strict=True)
@@ -141,6 +141,7 @@ def descend(trial: Trial, x: np.ndarray, phase: np.ndarray, settings: Estimation
             iterations=settings.iterations,
             workers=WORKERS,
             said=said,
+            together=partial(trial.together, last=last),
         )
         x = solution.x
     return solution

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from surgisim.artifacts.motion import Motion
 from surgisim.estimation.observation import Observation
 from surgisim.estimation.search import Search
+from surgisim.mpm.batch import Batch
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Breakdown, Run
@@ -36,11 +38,17 @@ class Trial:
     grip: float = 1.0
     """How firmly instruments hold, see Physics."""
 
-    def drive(self, values: Values, *, frames: int | None = None, safety: float = SAFETY, stiffest=None) -> Drive:
-        """The clip's motion at a step that is stable for `stiffest` (or `values`)."""
-        body = self.bodies[0]
-        rows = stiffest or body.stiffest(self.theta(values))
-        per_frame = body.per_frame_of(rows, self.fps, safety)
+    def per_frame(self, values: Values, *, safety: float = SAFETY, stiffest=None) -> int:
+        """Steps between two frames that are stable for `stiffest` (or `values`)."""
+        rows = stiffest or self.bodies[0].stiffest(self.theta(values))
+        return self.bodies[0].per_frame_of(rows, self.fps, safety)
+
+    def drive(
+        self, values: Values, *, frames: int | None = None, safety: float = SAFETY, stiffest=None,
+        per_frame: int | None = None,
+    ) -> Drive:  # fmt: skip
+        """The clip's motion, at a step that is stable for `stiffest` (or `values`) if `per_frame` is not given."""
+        per_frame = per_frame or self.per_frame(values, safety=safety, stiffest=stiffest)
         return self.bodies[0].drive(
             self.motion, values, fps=self.fps, per_frame=per_frame, frames=frames or self.frames, held=self.held,
             grip=self.grip,
@@ -64,6 +72,26 @@ class Trial:
         except Breakdown:
             return None
         return self.observation.residual(run.u, self.fitted[self.fitted <= last]).ravel()
+
+    def together(self, points: list[np.ndarray], last: int | None = None) -> list[np.ndarray | None]:
+        """`residual` at several x: side by side in one run on a GPU, on two threads on a CPU."""
+        if self.bodies[0].simulator.device == "cpu":
+            return at_once(lambda x, worker: self.residual(x, worker, last), points)
+        last = int(self.fitted[-1]) if last is None else last
+        values = [self.wanted.values(x) for x in points]
+        # One step for all: the smallest of theirs.
+        most = max(self.per_frame(v) for v in values)
+        drives = [self.drive(v, per_frame=most) for v in values]
+        runs = self.batch.run([self.theta(v) for v in values], drives, last=last)
+        frames = self.fitted[self.fitted <= last]
+        return [
+            None if isinstance(run, Breakdown) else self.observation.residual(run.u, frames).ravel() for run in runs
+        ]
+
+    @cached_property
+    def batch(self) -> Batch:
+        """As many bodies as parameters are usually varied at once."""
+        return Batch(self.bodies[0], max(4, len(self.wanted.start)))
 
 
 def at_once(work: Callable[[Any, int], Any], items: list[Any], workers: int = WORKERS) -> list[Any]:

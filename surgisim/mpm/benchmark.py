@@ -25,7 +25,7 @@ from surgisim.mpm.updated import Updated
 VALUES = {"corotated": {"E": 3000.0, "nu": 0.45}, "newtonian": {"eta": 2.0}}
 STEPS, EXTENT = 256, 0.06
 """Steps between two frames, and width of the world [m]."""
-FRAMES = {"cpu": 2, "cuda": 17}
+FRAMES = {"cpu": 2, "cuda": 65}
 """Of the motion: on a GPU enough that setting up a run, some milliseconds, does not count."""
 MEMORY = 2048.0
 """What the adjoint may record [MB]: all steps at once, so that it computes the run again just once."""

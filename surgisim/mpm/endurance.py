@@ -13,8 +13,10 @@ import math
 import time
 from collections.abc import Callable
 
+import matplotlib.pyplot as plt
 import numpy as np
 import warp as wp
+from matplotlib.figure import Figure
 from scipy import sparse
 
 from surgisim.artifacts.motion import Motion
@@ -93,14 +95,38 @@ def _stored(made: Prepared) -> Callable[[np.ndarray], float]:
     return energy
 
 
+def draw(result: dict) -> Figure:
+    """Energies and momentum over time."""
+    figure, (energy, momentum) = plt.subplots(2, 1, figsize=(7, 5), sharex=True, layout="constrained")
+    time = result["time_s"]
+    for name in ("stored", "kinetic"):
+        energy.semilogy(time, np.maximum(result[f"{name}_J"], 1e-30), label=name)
+    energy.set_ylim(1e-22, None)
+    energy.set_ylabel("energy [J]")
+    energy.legend()
+    momentum.plot(time, result["momentum_kg_m_s"], label=["x", "y", "z"])
+    momentum.set_ylabel("momentum [kg m/s]")
+    momentum.set_xlabel("time [s]")
+    momentum.legend()
+    for axis in (energy, momentum):
+        axis.axvspan(*PULL, color="0.9")
+        axis.axvline(RELEASE, color="0.5", linestyle=":")
+    energy.set_title(f"{result['particles']} particles, {result['steps']} steps: pulled (grey), held, let go (dotted)")
+    return figure
+
+
 def main() -> None:
     cli = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     cli.add_argument("--device", choices=["cpu", "cuda"], default="cpu")
     cli.add_argument("--particles", type=int, default=100_000)
     cli.add_argument("--grid", type=int, default=50, help="cells along the longest side")
     cli.add_argument("--steps", type=int, default=80_000, help="in 8 s")
+    cli.add_argument("--picture", help="where to draw the log, a PNG")
     arguments = cli.parse_args()
-    print(json.dumps(endure(arguments.device, arguments.particles, arguments.grid, arguments.steps)))
+    result = endure(arguments.device, arguments.particles, arguments.grid, arguments.steps)
+    if arguments.picture:
+        draw(result).savefig(arguments.picture, dpi=110)
+    print(json.dumps(result))
 
 
 if __name__ == "__main__":

@@ -84,3 +84,11 @@ class Grid:
         """Where the nodes are [m], (N, 3)."""
         axes = [self.origin[a] + self.spacing * np.arange(self.shape[a]) for a in range(3)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+
+
+def same_nodes(local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points that hang on the same nodes: those nodes, (C, K), in their order, and each point's row there, (P,)."""
+    # Big-endian bytes compare as the numbers do: neighbours stay neighbours.
+    rows = np.ascontiguousarray(local, ">i4").view(np.dtype((np.void, 4 * local.shape[1]))).ravel()
+    _, first, cell = np.unique(rows, return_index=True, return_inverse=True)
+    return local[first], cell

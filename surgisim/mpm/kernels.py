@@ -13,6 +13,8 @@ hang on the same nodes (those of one cell) are lumped first, one sum for each of
 its lumps. On a CPU, where a launch is one thread, particles add straight into the nodes instead: as repeatable, and
 without storing a stress; each of several threads has a share of the particles and its own part of the sums.
 
+The clock moves on where nobody reads it: in a kernel of its own on a CPU, while particles are lumped on a GPU.
+
 State lives in a ring of slots, (L, N): slot n % L is read and slot (n + 1) % L written, which
 serves a plain run (L = 2) and a recorded segment (L = steps + 1) alike.
 """
@@ -23,9 +25,6 @@ from types import SimpleNamespace
 import warp as wp
 
 from surgisim.physics.fold import REAL, folded
-
-ABREAST = 4
-"""Links that a GPU's thread fetches at once, rather than wait for one after the other; rows hold a multiple of it."""
 
 
 @cache
@@ -64,6 +63,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def lump(
+        clock: wp.array(dtype=int),
         begin: wp.array(dtype=int),
         link: wp.array2d(dtype=Link),
         stress: wp.array(dtype=Mat),
@@ -72,6 +72,9 @@ def node_kernels(precision: str) -> SimpleNamespace:
         lumped: wp.array(dtype=Vec),
     ):
         c, k = wp.tid()
+        if c + k == 0:
+            clock[0] = clock[0] + 1
+            clock[1] = clock[1] + 1
         total = Vec()
         for p in range(begin[c], begin[c + 1]):
             w = link[p, k]
@@ -94,6 +97,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
     @wp.kernel(module="unique", enable_backward=False)
     def step(
         clock: wp.array(dtype=int),
+        ahead: int,
         mass: wp.array(dtype=real),
         gravity: Vec,
         plain: int,
@@ -104,7 +108,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
         v: wp.array2d(dtype=Vec),
     ):
         i = wp.tid()
-        n = clock[0]
+        n = clock[0] - ahead
         here = n % slots
         there = (n + 1) % slots
         total = Vec()
@@ -149,6 +153,7 @@ def node_kernels(precision: str) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def lump_back(
+        clock: wp.array(dtype=int),
         begin: wp.array(dtype=int),
         link: wp.array2d(dtype=Link),
         F_bar: wp.array(dtype=Mat),
@@ -160,6 +165,9 @@ def node_kernels(precision: str) -> SimpleNamespace:
         lumped_v: wp.array(dtype=Vec),
     ):
         c, k = wp.tid()
+        if c + k == 0:
+            clock[0] = clock[0] - 1
+            clock[1] = clock[1] - 1
         du = Vec()
         dv = Vec()
         for p in range(begin[c], begin[c + 1]):
@@ -194,129 +202,11 @@ def node_kernels(precision: str) -> SimpleNamespace:
 
 
 @cache
-def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "single") -> SimpleNamespace:
-    """`step` and `adjoint` over particles, compiled for these laws; `scatter` into nodes, or leave that to a gather."""
+def law_functions(names: tuple[str, ...], precision: str = "single") -> SimpleNamespace:
+    """What the laws and the springs do at one particle: `answer`, and its adjoint `answer_back`."""
     laws, s = folded(names, precision), shapes(precision)
-    real, Vec, Mat, Link, Anchors = s.real, s.Vec, s.Mat, s.Link, s.Anchors
+    real, Vec, Mat, Anchors = s.real, s.Vec, s.Mat, s.Anchors
     Theta, Memory, respond, work = laws.Theta, laws.Memory, laws.respond, laws.work
-    AT_ONCE = 1 if scatter else ABREAST
-
-    @wp.func
-    def kinematics(
-        u: wp.array2d(dtype=Vec),
-        v: wp.array2d(dtype=Vec),
-        index: wp.array2d(dtype=int),
-        link: wp.array2d(dtype=Link),
-        slot: int,
-        p: int,
-    ):
-        # Nine numbers each rather than matrices: the CPU compiler keeps those in registers.
-        f00, f01, f02 = real(1.0), real(0.0), real(0.0)
-        f10, f11, f12 = real(0.0), real(1.0), real(0.0)
-        f20, f21, f22 = real(0.0), real(0.0), real(1.0)
-        d00, d01, d02 = real(0.0), real(0.0), real(0.0)
-        d10, d11, d12 = real(0.0), real(0.0), real(0.0)
-        d20, d21, d22 = real(0.0), real(0.0), real(0.0)
-        for block in range(index.shape[1] / wp.static(AT_ONCE)):
-            for j in range(wp.static(AT_ONCE)):
-                k = block * wp.static(AT_ONCE) + j
-                i = index[p, k]
-                w = link[p, k]
-                a = u[slot, i]
-                b = v[slot, i]
-                f00 += a[0] * w[1]
-                f01 += a[0] * w[2]
-                f02 += a[0] * w[3]
-                f10 += a[1] * w[1]
-                f11 += a[1] * w[2]
-                f12 += a[1] * w[3]
-                f20 += a[2] * w[1]
-                f21 += a[2] * w[2]
-                f22 += a[2] * w[3]
-                d00 += b[0] * w[1]
-                d01 += b[0] * w[2]
-                d02 += b[0] * w[3]
-                d10 += b[1] * w[1]
-                d11 += b[1] * w[2]
-                d12 += b[1] * w[3]
-                d20 += b[2] * w[1]
-                d21 += b[2] * w[2]
-                d22 += b[2] * w[3]
-        F = Mat(f00, f01, f02, f10, f11, f12, f20, f21, f22)
-        Fdot = Mat(d00, d01, d02, d10, d11, d12, d20, d21, d22)
-        return F, Fdot
-
-    @wp.func
-    def kinematics_and_forces(
-        u: wp.array2d(dtype=Vec),
-        v: wp.array2d(dtype=Vec),
-        f_bar: wp.array(dtype=Vec),
-        index: wp.array2d(dtype=int),
-        link: wp.array2d(dtype=Link),
-        slot: int,
-        p: int,
-    ):
-        f00, f01, f02 = real(1.0), real(0.0), real(0.0)
-        f10, f11, f12 = real(0.0), real(1.0), real(0.0)
-        f20, f21, f22 = real(0.0), real(0.0), real(1.0)
-        d00, d01, d02 = real(0.0), real(0.0), real(0.0)
-        d10, d11, d12 = real(0.0), real(0.0), real(0.0)
-        d20, d21, d22 = real(0.0), real(0.0), real(0.0)
-        a00, a01, a02 = real(0.0), real(0.0), real(0.0)
-        a10, a11, a12 = real(0.0), real(0.0), real(0.0)
-        a20, a21, a22 = real(0.0), real(0.0), real(0.0)
-        g0, g1, g2 = real(0.0), real(0.0), real(0.0)
-        for block in range(index.shape[1] / wp.static(AT_ONCE)):
-            for j in range(wp.static(AT_ONCE)):
-                k = block * wp.static(AT_ONCE) + j
-                i = index[p, k]
-                w = link[p, k]
-                a = u[slot, i]
-                b = v[slot, i]
-                f = f_bar[i]
-                f00 += a[0] * w[1]
-                f01 += a[0] * w[2]
-                f02 += a[0] * w[3]
-                f10 += a[1] * w[1]
-                f11 += a[1] * w[2]
-                f12 += a[1] * w[3]
-                f20 += a[2] * w[1]
-                f21 += a[2] * w[2]
-                f22 += a[2] * w[3]
-                d00 += b[0] * w[1]
-                d01 += b[0] * w[2]
-                d02 += b[0] * w[3]
-                d10 += b[1] * w[1]
-                d11 += b[1] * w[2]
-                d12 += b[1] * w[3]
-                d20 += b[2] * w[1]
-                d21 += b[2] * w[2]
-                d22 += b[2] * w[3]
-                a00 -= f[0] * w[1]
-                a01 -= f[0] * w[2]
-                a02 -= f[0] * w[3]
-                a10 -= f[1] * w[1]
-                a11 -= f[1] * w[2]
-                a12 -= f[1] * w[3]
-                a20 -= f[2] * w[1]
-                a21 -= f[2] * w[2]
-                a22 -= f[2] * w[3]
-                g0 += f[0] * w[0]
-                g1 += f[1] * w[0]
-                g2 += f[2] * w[0]
-        F = Mat(f00, f01, f02, f10, f11, f12, f20, f21, f22)
-        Fdot = Mat(d00, d01, d02, d10, d11, d12, d20, d21, d22)
-        A = Mat(a00, a01, a02, a10, a11, a12, a20, a21, a22)
-        return F, Fdot, A, Vec(g0, g1, g2)
-
-    @wp.func
-    def carried(
-        field: wp.array2d(dtype=Vec), index: wp.array2d(dtype=int), link: wp.array2d(dtype=Link), slot: int, p: int
-    ):
-        total = Vec()
-        for k in range(index.shape[1]):
-            total += link[p, k][0] * field[slot, index[p, k]]
-        return total
 
     @wp.func
     def read(theta: wp.array2d(dtype=real), p: int):
@@ -334,90 +224,65 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
             to += anchors.turn[a, n] * arm - arm
         return to
 
-    @wp.kernel(module="unique", enable_backward=False)
-    def step(
-        clock: wp.array(dtype=int),
-        index: wp.array2d(dtype=int),
-        link: wp.array2d(dtype=Link),
+    @wp.func
+    def answer(
+        F: Mat,
+        Fdot: Mat,
+        x: Vec,
+        y: Vec,
+        p: int,
+        n: int,
+        slot: int,
+        after_slot: int,
+        dt: real,
+        part: int,
         volume: wp.array(dtype=real),
         rho: wp.array(dtype=real),
         rest: wp.array(dtype=Vec),
         theta: wp.array2d(dtype=real),
         anchors: Anchors,
-        dt: real,
-        slots: int,
-        part: int,
-        begin: int,
-        u: wp.array2d(dtype=Vec),
-        v: wp.array2d(dtype=Vec),
         q: wp.array2d(dtype=Memory),
-        stress: wp.array(dtype=Mat),
-        push: wp.array(dtype=Vec),
-        force: wp.array2d(dtype=Vec),
         trouble: wp.array2d(dtype=int),
     ):
-        p = begin + wp.tid()
-        n = clock[1]
-        slot = clock[0] % slots
-        F, Fdot = kinematics(u, v, index, link, slot, p)
-        J = wp.determinant(F)
+        """Stress and force of particle p at step n, times its volume; its memory is moved on."""
         # Written so that a NaN is trouble too.
-        if not (real(0.0) < J):
+        if not (real(0.0) < wp.determinant(F)):
             wp.atomic_min(trouble, part, 0, n)
             trouble[part, 1] = p
-        held = anchors.member[p]
-        x = Vec()
-        y = Vec()
-        if wp.static(laws.forces):
-            x = carried(u, index, link, slot, p)
-            y = carried(v, index, link, slot, p)
-        elif held > 0:
-            x = carried(u, index, link, slot, p)
         before = Memory()
         if wp.static(laws.memory > 0):
             before = q[slot, p]
         P, b, after = respond(F, Fdot, x, y, before, read(theta, p), real(n) * dt, dt, rho[p])
         if wp.static(laws.memory > 0):
-            q[(clock[0] + 1) % slots, p] = after
-        piola = volume[p] * P
+            q[after_slot, p] = after
         pull = volume[p] * b
+        held = anchors.member[p]
         if held > 0:
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.hold[a, n] > real(0.0):
                     away = target(anchors, rest[p], a, n) - x
                     pull += (volume[p] * anchors.share[p] * anchors.hold[a, n]) * (anchors.stiffness[a] * away)
-        if wp.static(scatter):
-            for k in range(index.shape[1]):
-                w = link[p, k]
-                wp.atomic_add(force, part, index[p, k], w[0] * pull - piola * Vec(w[1], w[2], w[3]))
-        else:
-            stress[p] = piola
-            push[p] = pull
+        return volume[p] * P, pull
 
-    @wp.kernel(module="unique", enable_backward=False)
-    def adjoint(
-        clock: wp.array(dtype=int),
-        index: wp.array2d(dtype=int),
-        link: wp.array2d(dtype=Link),
+    @wp.func
+    def answer_back(
+        F: Mat,
+        Fdot: Mat,
+        x: Vec,
+        y: Vec,
+        A: Mat,
+        b: Vec,
+        p: int,
+        n: int,
+        slot: int,
+        dt: real,
+        part: int,
         volume: wp.array(dtype=real),
         rho: wp.array(dtype=real),
         rest: wp.array(dtype=Vec),
         theta: wp.array2d(dtype=real),
         anchors: Anchors,
-        dt: real,
-        slots: int,
-        part: int,
-        begin: int,
-        u: wp.array2d(dtype=Vec),
-        v: wp.array2d(dtype=Vec),
         q: wp.array2d(dtype=Memory),
-        f_bar: wp.array(dtype=Vec),
-        F_bar: wp.array(dtype=Mat),
-        Fdot_bar: wp.array(dtype=Mat),
-        x_bar: wp.array(dtype=Vec),
-        y_bar: wp.array(dtype=Vec),
-        u_bar: wp.array2d(dtype=Vec),
-        v_bar: wp.array2d(dtype=Vec),
         q_bar: wp.array(dtype=Memory),
         theta_bar: wp.array2d(dtype=real),
         rho_bar: wp.array(dtype=real),
@@ -425,18 +290,7 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
         hold_bar: wp.array3d(dtype=real),
         stiffness_bar: wp.array2d(dtype=Mat),
     ):
-        p = begin + wp.tid()
-        n = clock[1]
-        slot = clock[0] % slots
-        F, Fdot, A, b = kinematics_and_forces(u, v, f_bar, index, link, slot, p)
-        held = anchors.member[p]
-        x = Vec()
-        y = Vec()
-        if wp.static(laws.forces):
-            x = carried(u, index, link, slot, p)
-            y = carried(v, index, link, slot, p)
-        elif held > 0 and stiffness_bar.shape[1] > 0:
-            x = carried(u, index, link, slot, p)
+        """Derivatives by F, Fdot, x and y, given those by stress and force, A and b; the others are added up."""
         before = Memory()
         Q = Memory()
         if wp.static(laws.memory > 0):
@@ -451,6 +305,7 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
             rho_bar[p] = rho_bar[p] + drho
         for m in range(wp.static(laws.columns)):
             theta_bar[p, m] = theta_bar[p, m] + dtheta[m]
+        held = anchors.member[p]
         if held > 0:
             for a in range(anchors.path.shape[0]):
                 if ((held >> a) & 1) == 1 and anchors.hold[a, n] > real(0.0):
@@ -464,19 +319,6 @@ def particle_kernels(names: tuple[str, ...], scatter: bool, precision: str = "si
                         gain = volume[p] * anchors.share[p]
                         wp.atomic_add(hold_bar, part, a, n, gain * wp.dot(b, anchors.stiffness[a] * away))
                         wp.atomic_add(stiffness_bar, part, a, (gain * anchors.hold[a, n]) * wp.outer(b, away))
-        if wp.static(scatter):
-            for k in range(index.shape[1]):
-                w = link[p, k]
-                g = Vec(w[1], w[2], w[3])
-                wp.atomic_add(u_bar, part, index[p, k], dF * g + w[0] * dx)
-                if wp.static(laws.forces):
-                    wp.atomic_add(v_bar, part, index[p, k], dFdot * g + w[0] * dy)
-                else:
-                    wp.atomic_add(v_bar, part, index[p, k], dFdot * g)
-        else:
-            F_bar[p] = dF
-            Fdot_bar[p] = dFdot
-            x_bar[p] = dx
-            y_bar[p] = dy
+        return dF, dFdot, dx, dy
 
-    return SimpleNamespace(step=step, adjoint=adjoint, columns=laws.columns, memory=laws.memory, laws=laws)
+    return SimpleNamespace(answer=answer, answer_back=answer_back, laws=laws)

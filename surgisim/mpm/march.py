@@ -8,10 +8,14 @@ GRAPH = 64
 """Steps that a CUDA graph holds at most: enough that starting it costs nothing."""
 
 
-class March:
-    """Phases in order; the launches of one phase do not touch each other's sums."""
+Phases = list[list[wp.Launch]]
+"""Phases in order; the launches of one phase do not touch each other's sums."""
 
-    def __init__(self, phases: list[list[wp.Launch]], device: str) -> None:
+
+class March:
+    """The phases of a step."""
+
+    def __init__(self, phases: Phases, device: str) -> None:
         self.phases, self.device = phases, device
         self._graphs: dict[int, wp.Graph] | None = {} if wp.get_device(device).is_cuda else None
 
@@ -38,7 +42,7 @@ class March:
         return self._graphs[steps]
 
 
-def _launched(phases: list[list[wp.Launch]], steps: int) -> None:
+def _launched(phases: Phases, steps: int) -> None:
     """On a CPU: a second launch of a phase runs on a thread of its own, as a launch releases the interpreter's lock."""
     crew = [_Hand() for _ in range(max(map(len, phases)) - 1)]
     try:

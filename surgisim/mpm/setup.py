@@ -18,7 +18,7 @@ from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import ANCHOR, BASE, SHARP_ANCHOR, Drive, drive
 from surgisim.mpm.kink import Ball
 from surgisim.mpm.simulator import Simulator
-from surgisim.mpm.stable import check_step, largest_step, shear_speed, wave_speed
+from surgisim.mpm.stable import check_speed, check_step, largest_step, shear_speed, wave_speed
 from surgisim.mpm.updated import Updated
 from surgisim.physics.catalogue import Numbers, Term, choose, columns, defaults
 from surgisim.physics.place import Place, rows
@@ -74,8 +74,9 @@ class Prepared:
         frames: int | None = None,
         held: np.ndarray | None = None,
         grip: float = 1.0,
+        places: Mapping[str, Place] | None = None,
     ) -> Drive:
-        """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values`.
+        """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values` at `places`.
 
         A grip smaller than a cell is widened to one: the grid cannot carry a smaller ball along, and would let
         the tissue slip out of it.
@@ -99,9 +100,10 @@ class Prepared:
             stiffness=spring,
             grip=grip,
         )
+        check_speed(path.path, path.step, spacing, fps)
         # Tissue that cannot be squeezed pushes on its base far harder than it shears it.
         path.stiffness[0] *= max(1.0, BASE * pressure**2 / self._held_motion(held) / spring)
-        path = replace(path, share=path.share * self._firmer(self.theta(values, held=held)))
+        path = replace(path, share=path.share * self._firmer(self.theta(values, places, held)))
         for name, term in laws.items():
             if term.drive is not None:
                 path = term.drive(path, **values[name])

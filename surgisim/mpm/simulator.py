@@ -8,19 +8,19 @@ memory allowed is walked in several stretches.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import warp as wp
 
+from surgisim.mpm.by_cell import ByCell
+from surgisim.mpm.by_particle import ByParticle
 from surgisim.mpm.culprit import culprit
 from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
-from surgisim.mpm.kernels import ABREAST, node_kernels, particle_kernels, shapes, tick
+from surgisim.mpm.kernels import node_kernels, shapes, tick
 from surgisim.mpm.kink import Ball
-from surgisim.mpm.march import March
+from surgisim.mpm.march import March, Phases
 from surgisim.mpm.nodes import Nodes
 from surgisim.physics.catalogue import choose, columns
 from surgisim.problem import Problem
@@ -28,15 +28,13 @@ from surgisim.problem import Problem
 wp.config.log_level = wp.LOG_WARNING
 
 NEVER = 2**31 - 1
-BLOCK = 64
-"""Particles that a GPU steps in one block: few, so that no multiprocessor waits for the last one."""
 
 State = tuple[np.ndarray, ...]
 """u, v over solid nodes, (A, 3) each, and, where a law has memory, q, (P, S)."""
 
 
-def adds(device: str) -> bool:
-    """Whether particles add into nodes there; otherwise nodes gather."""
+def by_cell(device: str) -> bool:
+    """Whether particles are stepped cell by cell there, as on a CPU, or each by itself."""
     return not wp.get_device(device).is_cuda
 
 
@@ -103,7 +101,7 @@ class Simulator(Nodes):
         self.rest, self.terms, self.device, self.density = np.asarray(rest, float), tuple(terms), device, float(density)
         self.count, self.volume_p, self.precision = len(rest), np.asarray(volume, float), precision
         super().__init__(grid, self.rest, self.volume_p, cut, balls)
-        self.types = shapes(precision)
+        self.types, self.threads = shapes(precision), threads
         self.real = np.float32 if precision == "single" else np.float64
         local, links = self.links(self.rest)
         # A kink's weights sum to nothing: its inertia is what keeps it as slow as a cell.
@@ -111,51 +109,19 @@ class Simulator(Nodes):
         self._local, self._weight = local, np.where(local < self.rule.shape[1], links[..., 0], inertia)
         s = self.types
         self.gravity = s.Vec(*gravity)
-        self.scatter = adds(device)
-        self.order, self.lumps = np.arange(self.count), None
-        if not self.scatter:
-            local, links = (_padded(a, ABREAST) for a in (local, links))
-            self.order, self.lumps = self._lumps(local)
-        self.index, self.link = self._put(local[self.order], int), self._put(links[self.order], s.Link)
-        if self.lumps:
-            # Neighbouring threads, which step neighbouring particles, read neighbouring numbers; cells read whole rows.
-            self.lumps.link = self.link
-            self.index, self.link = self._by_column(local, int), self._by_column(links, s.Link)
+        layout = ByCell if by_cell(device) else ByParticle
+        self.layout = layout(local, links, len(self.place), self.terms, precision, threads, self._put)
+        self.order, self.laws = self.layout.order, self.layout.laws
         self.volume, self.rest_d = self._put(self.volume_p[self.order], s.real), self._put(self.rest[self.order], s.Vec)
-        ends = np.linspace(0, self.count, (threads if self.scatter else 1) + 1).astype(int)
-        self.parts = [(int(a), int(b - a)) for a, b in pairwise(ends)]
         self.nodes = node_kernels(precision)
-        self.kernels = particle_kernels(self.terms, self.scatter, precision)
-        self.width = self.kernels.memory
+        self.width = self.laws.memory
         self.mass = self._put(self.node_mass(np.full(self.count, self.density)), s.real)
-        per_particle = 1 if self.scatter else self.count
-        self.stress = wp.zeros(per_particle, dtype=s.Mat, device=device)
-        self.push = wp.zeros(per_particle, dtype=s.Vec, device=device)
         self.clock = wp.zeros(2, dtype=int, device=device)
-        self.trouble = self._put(np.tile([NEVER, 0], (len(self.parts), 1)), int)
-        self.force = wp.zeros((len(self.parts), len(self.place)), dtype=s.Vec, device=device)
+        self.trouble = self._put(np.tile([NEVER, 0], (self.layout.parts, 1)), int)
+        self.force = wp.zeros((self.layout.parts, len(self.place)), dtype=s.Vec, device=device)
         # Loaded here, once: two threads that load one module at their first launch crash the process.
-        for kernel in (self.kernels.step, self.kernels.adjoint, *vars(self.nodes).values(), tick):
+        for kernel in (self.layout.kernels.step, self.layout.kernels.adjoint, *vars(self.nodes).values(), tick):
             wp.load_module(kernel.module, device=device)
-
-    def _lumps(self, local: np.ndarray) -> tuple[np.ndarray, SimpleNamespace]:
-        """Particles sorted by the nodes they hang on, their cells, and every node's places in the cells' sums."""
-        # Big-endian bytes compare as the numbers do: neighbours stay neighbours.
-        rows = np.ascontiguousarray(local, ">i4").view(np.dtype((np.void, 4 * local.shape[1]))).ravel()
-        _, first, cell = np.unique(rows, return_index=True, return_inverse=True)
-        # Rows of odd length: at powers of two the sums of neighbouring cells push each other out of the cache.
-        width = local.shape[1]
-        stride = width | 1
-        nodes = local[first].ravel()
-        at = (np.arange(len(first))[:, None] * stride + np.arange(width)).ravel()
-        entry = np.argsort(nodes, kind="stable")
-        return np.argsort(cell, kind="stable"), SimpleNamespace(
-            shape=(len(first), width),
-            stride=stride,
-            begin=self._put(np.searchsorted(np.sort(cell), np.arange(len(first) + 1)), int),
-            start=self._put(np.searchsorted(nodes[entry], np.arange(len(self.place) + 1)), int),
-            entry=self._put(at[entry], int),
-        )
 
     def node_mass(self, density: np.ndarray) -> np.ndarray:
         """Mass of the solid nodes [kg], (A,), for a density at every particle [kg/m^3], (P,)."""
@@ -255,6 +221,7 @@ class Simulator(Nodes):
             length = min(stretch, count - k * stretch)
             self._load(task, starts[k], step + k * stretch)
             task.forward.march(length)
+            wp.launch(tick, 1, [self.clock, -1], device=self.device)
             back.commands.march(length)
 
     def _stretch(self, per: int, memory_mb: float) -> int:
@@ -276,7 +243,7 @@ class Simulator(Nodes):
     def _theta_bar(self, back: "_Back") -> np.ndarray:
         theta_bar = self._by_particle(back.theta.numpy().astype(float))
         laws = choose(self.terms)
-        heavy = [columns(laws).index(f"{n}.{laws[n].mass}") for n in self.kernels.laws.mass]
+        heavy = [columns(laws).index(f"{n}.{laws[n].mass}") for n in self.laws.mass]
         if heavy:
             # The density acts through the nodes' mass and through forces that are proportional to it.
             through = (self._weight * back.mass.numpy()[self._local]).sum(1) * self.volume_p
@@ -289,95 +256,62 @@ class Simulator(Nodes):
         kind = np.int32 if dtype is int else self.real
         return wp.array(np.ascontiguousarray(array, kind), dtype=dtype, device=self.device)
 
-    def _by_column(self, rows: np.ndarray, dtype):
-        """Rows in the device's order, (P, K), laid out column after column."""
-        return self._put(np.swapaxes(rows[self.order], 0, 1), dtype).transpose()
-
     def _zeros(self, shape, dtype):
         return wp.zeros(shape, dtype=dtype, device=self.device)
 
     def _task(self, theta: np.ndarray, drive: Drive, slots: int) -> "_Task":
         """Device arrays and recorded launches of one run."""
         theta = np.asarray(theta)
-        if theta.shape != (self.count, self.kernels.columns):
-            raise Problem(f"theta is {theta.shape}, but ({self.count}, {self.kernels.columns}) is wanted.")
+        if theta.shape != (self.count, self.laws.columns):
+            raise Problem(f"theta is {theta.shape}, but ({self.count}, {self.laws.columns}) is wanted.")
         s, laws = self.types, choose(self.terms)
         density = np.full(self.count, self.density)
-        for name in self.kernels.laws.mass:
+        for name in self.laws.mass:
             density = density + theta[:, columns(laws).index(f"{name}.{laws[name].mass}")]
-        if self.kernels.laws.mass:
+        if self.laws.mass:
             self.mass.assign(self.node_mass(density).astype(self.real))
         u, v = (self._zeros((slots, len(self.place)), s.Vec) for _ in range(2))
-        q = self._zeros((slots, self.count if self.width else 1), self.kernels.laws.Memory)
-        shared = [
-            self.clock, self.index, self.link, self.volume, self._put(density[self.order], s.real), self.rest_d,
-            self._put(theta[self.order], s.real), self._anchors(drive), s.real(drive.step), slots,
+        q = self._zeros((slots, self.count if self.width else 1), self.laws.Memory)
+        inputs = [
+            self.volume, self._put(density[self.order], s.real), self.rest_d, self._put(theta[self.order], s.real),
+            self._anchors(drive), s.real(drive.step), slots, u, v, q,
         ]  # fmt: skip
-        inputs = [[*shared, part, begin, u, v, q] for part, (begin, _) in enumerate(self.parts)]
-        launch = {"device": self.device, "record_cmd": True}
-        outs = [self.stress, self.push, self.force, self.trouble]
-        nodes = [self.clock, self.mass, self.gravity, self.rule.shape[1], s.real(drive.step), slots, self.force, u, v]
+        step = [
+            self.clock, int(self.layout.ticks), self.mass, self.gravity, self.rule.shape[1], s.real(drive.step), slots,
+            self.force, u, v,
+        ]  # fmt: skip
         forward = [
-            self._particles(self.kernels.step, inputs, outs),
-            [wp.launch(self.nodes.step, len(self.place), nodes, **launch)],
-            [wp.launch(tick, 1, [self.clock, 1], **launch)],
+            *self.layout.forward(self.clock, inputs, self.force, self.trouble),
+            [wp.launch(self.nodes.step, len(self.place), step, device=self.device, record_cmd=True)],
+            *self._tick(1),
         ]
-        if self.lumps:
-            forward[1:1] = self._gathered("", [self.stress, self.push], [self.force])
         return _Task(slots, u, v, q, inputs, March(forward, self.device))
+
+    def _tick(self, by: int) -> Phases:
+        if self.layout.ticks:
+            return []
+        return [[wp.launch(tick, 1, [self.clock, by], device=self.device, record_cmd=True)]]
 
     def _back(self, task: "_Task", drive: Drive, springs: bool) -> "_Back":
         """Device arrays and recorded launches of the way back; nothing is stepped by recording them."""
-        s, heavy = self.types, bool(self.kernels.laws.mass)
+        s, heavy, parts = self.types, bool(self.laws.mass), self.layout.parts
         f = self._zeros(len(self.place), s.Vec)
-        u, v = (self._zeros((len(self.parts), len(self.place)), s.Vec) for _ in range(2))
+        u, v = (self._zeros((parts, len(self.place)), s.Vec) for _ in range(2))
         m = self._zeros(len(self.place) if heavy else 0, s.real)
         rho = self._zeros(self.count if heavy else 0, s.real)
-        per_particle = 1 if self.scatter else self.count
-        F, G = (self._zeros(per_particle, s.Mat) for _ in range(2))
-        x, y = (self._zeros(per_particle, s.Vec) for _ in range(2))
-        q = self._zeros(self.count if self.width else 1, self.kernels.laws.Memory)
-        theta = self._zeros((self.count, self.kernels.columns), s.real)
-        parts = len(self.parts)
+        q = self._zeros(self.count if self.width else 1, self.laws.Memory)
+        theta = self._zeros((self.count, self.laws.columns), s.real)
         path = self._zeros((parts, *drive.path.shape[:2]), s.Vec)
         hold = self._zeros((parts, *(drive.hold.shape if springs else (0, 0))), s.real)
         stiffness = self._zeros((parts, len(drive.path) if springs else 0), s.Mat)
-        launch = {"device": self.device, "record_cmd": True}
         gravity = [self.gravity, self.rule.shape[1]]
         before = [self.clock, self.mass, *gravity, s.real(drive.step), task.slots, task.v, u, v, f, m]
-        outs = [f, F, G, x, y, u, v, q, theta, rho, path, hold, stiffness]
         commands = [
-            [wp.launch(tick, 1, [self.clock, -1], **launch)],
-            [wp.launch(self.nodes.before, len(self.place), before, **launch)],
-            self._particles(self.kernels.adjoint, task.inputs, outs),
+            [wp.launch(self.nodes.before, len(self.place), before, device=self.device, record_cmd=True)],
+            *self.layout.back(self.clock, task.inputs, f, u, v, [q, theta, rho, path, hold, stiffness]),
+            *self._tick(-1),
         ]
-        if self.lumps:
-            commands += self._gathered("_back", [F, G, x, y], [u, v])
         return _Back(u, v, q, theta, path, hold, stiffness, m, rho, March(commands, self.device))
-
-    def _gathered(self, way: str, per_particle: list, at_nodes: list) -> list:
-        """Recorded launches that sum over the particles of every node, in two phases."""
-        m, launch = self.lumps, {"device": self.device, "record_cmd": True}
-        sums = [self._zeros(m.shape[0] * m.stride, self.types.Vec) for _ in at_nodes]
-        lump, gather = (getattr(self.nodes, f"{name}{way}") for name in ("lump", "gather"))
-        return [
-            [
-                wp.launch(
-                    lump,
-                    m.shape,
-                    [m.begin, m.link, *per_particle, m.stride, *sums],
-                    **launch,
-                )
-            ],
-            [wp.launch(gather, len(self.place), [m.start, m.entry, *sums, *at_nodes], **launch)],
-        ]
-
-    def _particles(self, kernel, inputs: list, outs: list) -> list:
-        """One recorded launch for each share of the particles."""
-        return [
-            wp.launch(kernel, count, mine + outs, device=self.device, record_cmd=True, block_dim=BLOCK)
-            for mine, (_, count) in zip(inputs, self.parts, strict=True)
-        ]
 
     def _anchors(self, drive: Drive):
         s = self.types
@@ -400,7 +334,7 @@ class Simulator(Nodes):
             else:
                 array[0].zero_()
         self.clock.assign(np.array([0, step], np.int32))
-        self.trouble.assign(np.tile(np.array([NEVER, 0], np.int32), (len(self.parts), 1)))
+        self.trouble.assign(np.tile(np.array([NEVER, 0], np.int32), (self.layout.parts, 1)))
 
     def _state(self, task: "_Task", slot: int) -> State:
         u, v, q = (array[slot].numpy().copy() for array in (task.u, task.v, task.q))
@@ -432,13 +366,6 @@ class Simulator(Nodes):
             f"number) at step {step} ({step * drive.step:.4f} s), where {law} pushed hardest. Its load is too violent "
             "for this tissue or the step too large: take a smaller step, a gentler motion, or a stiffer tissue."
         )
-
-
-def _padded(rows: np.ndarray, multiple: int) -> np.ndarray:
-    """Rows (P, K, ...) made longer to a multiple, by their first node with links of weight zero."""
-    more = -rows.shape[1] % multiple
-    filler = rows[:, :1] if rows.ndim == 2 else np.zeros_like(rows[:, :1])
-    return np.concatenate([rows, np.repeat(filler, more, 1)], 1)
 
 
 @dataclass(frozen=True)

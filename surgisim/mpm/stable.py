@@ -57,10 +57,33 @@ def largest_step(terms: Mapping[str, Term], rows: Mapping[str, Numbers], density
     return 4 / (d + math.sqrt(d**2 + 4 * w2))
 
 
+JUMP = 0.25
+"""Of a cell, that an anchor may move in one step."""
+
+
 def check_step(step: float, largest: float, where: str = "step") -> None:
     """Refuse a step that would blow up."""
     if step > largest * (1 + 1e-9):
         raise Problem(
             f"{where}: a step of {step:.3e} s is too large for this tissue's wave speed and viscosity; the largest "
             f"stable one is {largest:.3e} s. Take that, a coarser grid, or a softer tissue."
+        )
+
+
+def check_speed(path: np.ndarray, step: float, spacing: float, fps: float) -> None:
+    """Raise Problem where an anchor of `path` [m], (J, S + 1, 3), runs through more than a share of a cell in a step.
+
+    Springs hold what is gripped: what jumps ahead of it by a good part of a cell tears it instead of carrying it.
+    """
+    if path.shape[1] < 2:
+        return
+    jumps = np.linalg.norm(np.diff(path, axis=1), axis=-1)
+    worst = float(jumps.max())
+    if worst > JUMP * spacing:
+        j, n = np.unravel_index(jumps.argmax(), jumps.shape)
+        needed = math.ceil(1 / (fps * step) * worst / (JUMP * spacing))
+        raise Problem(
+            f"motion: {'the base' if j == 0 else f'grip {j - 1}'} moves {1e3 * worst:.2f} mm in one step at "
+            f"{n * step:.3f} s, but at most {1e3 * JUMP * spacing:.2f} mm, a quarter of a cell, can be followed. Check "
+            f"the path's units and frame rate, or take at least {needed} steps per frame."
         )

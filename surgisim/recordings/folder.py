@@ -79,6 +79,11 @@ def read_recording(folder: Path) -> Recording:
 
 def write_recording(recording: Recording, folder: Path) -> None:
     """Write the folder in metres; its files appear together or not at all."""
+    save_bytes({folder / name: content for name, content in encoded_recording(recording).items()})
+
+
+def encoded_recording(recording: Recording) -> dict[str, bytes]:
+    """File name -> bytes of the folder."""
     told = {
         "format": FORMAT,
         "name": recording.name,
@@ -98,15 +103,15 @@ def write_recording(recording: Recording, folder: Path) -> None:
     grips = {"center_rest": motion.center_rest, "radius": motion.radius}
     grips |= {"position": motion.position, "active": motion.active}
     files = {
-        folder / NAME: _json(told),
-        folder / "rest.ply": write_mesh(recording.mesh),
-        folder / "fixed.json": _json({"boxes": boxes}),
-        folder / "tracks.npz": _npz(tracks),
-        folder / "grip.npz": _npz(grips),
+        NAME: _json(told),
+        "rest.ply": write_mesh(recording.mesh),
+        "fixed.json": _json({"boxes": boxes}),
+        "tracks.npz": _npz(tracks),
+        "grip.npz": _npz(grips),
     }
     if recording.split is not None:
-        files[folder / "split.json"] = _json({name: list(span) for name, span in recording.split.items()})
-    save_bytes(files)
+        files["split.json"] = _json({name: list(span) for name, span in recording.split.items()})
+    return files
 
 
 def _motion(path: Path, frames: int, unit: float) -> Motion:

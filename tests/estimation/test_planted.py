@@ -19,6 +19,7 @@ from surgisim.estimation.rounds import windows
 from surgisim.estimation.search import search
 from surgisim.estimation.support import supports
 from surgisim.mpm.setup import prepare
+from surgisim.physics.place import Place
 from surgisim.problem import Problem
 
 FPS, T = 25.0, 24
@@ -31,10 +32,10 @@ def silent(*_):
     pass
 
 
-def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, held=None, seed=0):
+def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, held=None, seed=0, places=None):
     """What the stages before would hand over, made with `values` and then forgotten."""
     body, motion = slab(), motion or pulled(frames=T, hold=9)
-    made = prepare(body, tuple(values), density=1050.0)
+    made = prepare(body, tuple(values), density=1050.0, places=places)
     theta = made.theta(values)
     if stiff is not None:
         theta[:, 0] *= stiff(body.rest)
@@ -131,19 +132,15 @@ def test_a_stiff_half_is_found_by_the_refinement():
 
 
 def test_a_lump_whose_place_is_given_tells_how_stiff_it_is():
-    center, extent = (0.009, 0.0, 0.066), 0.006
-
-    def stiff(rest):
-        return 1 + 2 * np.exp(-0.5 * ((rest - np.array(center)) ** 2).sum(1) / extent**2)
-
-    terms = ["corotated", "newtonian", "stiff_inclusion"]
-    known = {"corotated": {"E": 900.0, "nu": 0.38}, "newtonian": {"eta": 1.2}, "stiff_inclusion": {"s": 1.2}}
+    places = {"stiff_inclusion": Place((0.009, 0.0, 0.066), 0.006)}
+    known = TRUE | {"stiff_inclusion": {"s": 1.2}}
     fixed = ["corotated.E", "corotated.nu", "newtonian.eta"]
-    places = {"stiff_inclusion": {"center": center, "extent": extent}}
-    settings = Estimation(**QUICK, terms=terms, start=known, fixed=fixed, places=places, support=False)
-    _, physics, _ = estimate(*clip(stiff=stiff, noise=1e-5), settings, silent)
+    given = {law: {"center": place.center, "extent": place.extent} for law, place in places.items()}
+    settings = Estimation(**QUICK, terms=list(known), start=known, fixed=fixed, places=given, support=False)
+    planted = clip(TRUE | {"stiff_inclusion": {"s": 3.0}}, noise=1e-5, places=places)
+    _, physics, _ = estimate(*planted, settings, silent)
     assert physics.terms["stiff_inclusion"]["s"]["value"] == pytest.approx(3.0, rel=0.1)
-    assert physics.places["stiff_inclusion"]["extent"] == extent
+    assert physics.places["stiff_inclusion"]["extent"] == 0.006
 
 
 def test_a_place_for_a_law_that_the_body_lacks_is_refused():

@@ -1,4 +1,4 @@
-"""The GPU's way to sum, lumped by cells and gathered by nodes, run on the CPU against the CPU's own way."""
+"""The GPU's way to step and to sum, run on the CPU against the CPU's own way."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ VALUES = {
 
 
 @pytest.mark.parametrize("grips", [False, True])
-def test_gathering_moves_the_body_as_adding_does_and_gives_the_same_gradient(monkeypatch, grips):
+def test_particle_by_particle_moves_the_body_as_cell_by_cell_does_and_gives_the_same_gradient(monkeypatch, grips):
     def one():
         body, motion = slab(), pulled()
         made = prepare(body, tuple(VALUES), density=1050.0, precision="double", grips=motion if grips else None)
@@ -28,6 +28,6 @@ def test_gathering_moves_the_body_as_adding_does_and_gives_the_same_gradient(mon
         return run.u, back.theta, back.path, back.stiffness
 
     added = one()
-    monkeypatch.setattr(simulator, "adds", lambda device: False)
+    monkeypatch.setattr(simulator, "by_cell", lambda device: False)
     for ours, theirs in zip(one(), added, strict=True):
         assert np.linalg.norm(ours - theirs) < 1e-10 * np.linalg.norm(theirs)

@@ -1,14 +1,17 @@
 """The printed step is stable, and no node is left so light that it would ask for a smaller one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from slab import slab
+from slab import pulled, slab
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.motion import Motion
 from surgisim.mpm.extension import LEAST
 from surgisim.mpm.setup import prepare
+from surgisim.problem import Problem
 
 FPS, FRAMES = 25.0, 6
 NOBODY = Motion(
@@ -47,3 +50,13 @@ def test_no_node_is_left_lighter_than_the_least_share(by):
     made = prepare(turned(slab(spacing=0.0045), by), ("corotated",), density=1050.0)
     mass = made.simulator.mass.numpy()
     assert mass.min() > 0.9 * LEAST * mass.max()
+
+
+def test_a_grip_that_jumps_is_refused_with_what_would_do():
+    body, motion = slab(), pulled()
+    jumpy = replace(motion, position=motion.position.copy())
+    jumpy.position[0, 3:] += [1.0, 0.0, 0.0]
+    made = prepare(body, ("corotated",), density=1050.0)
+    values = {"corotated": {"E": 900.0, "nu": 0.4}}
+    with pytest.raises(Problem, match=r"grip 0 moves .* in one step .* at least \d+ steps per frame"):
+        made.drive(jumpy, values, fps=25.0, per_frame=made.per_frame(values, 25.0))

@@ -1,6 +1,15 @@
-"""Recordings that conceal some physics. What they conceal goes where no rule that diagnoses reads."""
+"""Recordings that conceal some physics: invented, sealed, diagnosed, and only then opened and scored.
 
-import json
+`snakemake blind --config cases=40 seed=7`. What they conceal lies in sealed/, which the rule `score` alone reads.
+"""
+
+
+wildcard_constraints:
+    seed=r"\d+",
+    case=r"\d+",
+    way="|".join(WAYS),
+    shorter="|".join(SHORTER),
+    side=r"ablations|phases",
 
 
 rule invent:
@@ -16,18 +25,15 @@ rule invent:
         truth_tracks="blind/{seed}/{case}/sealed/truth.npz",
         salt="blind/{seed}/{case}/sealed/salt.txt",
     log:
-        "logs/blind/{seed}/{case}.log",
+        "logs/blind/{seed}/{case}/invent.log",
     benchmark:
-        "benchmarks/blind/{seed}/{case}.tsv"
-    wildcard_constraints:
-        seed=r"\d+",
-        case=r"\d+",
+        "benchmarks/blind/{seed}/{case}/invent.tsv"
     conda:
         "../../envs/physics.yaml"
     resources:
         mem_mb=2000,
     params:
-        settings=lambda w: json.dumps({"seed": int(w.seed), "case": int(w.case)}),
+        settings=inventing,
         code=code("invent"),
     shell:
         'python "$SURGISIM/stages/invent.py"'
@@ -35,3 +41,248 @@ rule invent:
         " --tracks {output.tracks} --split {output.split} --seal {output.seal}"
         " --truth {output.truth} --truth-tracks {output.truth_tracks} --salt {output.salt}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
+rule seals:
+    input:
+        seal=every("blind/{seed}/{case}/seal.txt"),
+    output:
+        seals="blind/{seed}/seals.txt",
+    log:
+        "logs/blind/{seed}/seals.log",
+    benchmark:
+        "benchmarks/blind/{seed}/seals.tsv"
+    conda:
+        "../../envs/report.yaml"
+    resources:
+        mem_mb=500,
+    params:
+        code=code("seals"),
+    shell:
+        'python "$SURGISIM/stages/seals.py"'
+        " --seal {input.seal} --seals {output.seals} --code {params.code} > {log} 2>&1"
+
+
+rule shuffle:
+    input:
+        recording=[f"blind/{{seed}}/{{case}}/recording/{name}" for name in FILES],
+        other=others,
+    output:
+        recording="blind/{seed}/{case}/shuffled/recording/recording.json",
+        rest="blind/{seed}/{case}/shuffled/recording/rest.ply",
+        fixed="blind/{seed}/{case}/shuffled/recording/fixed.json",
+        grip="blind/{seed}/{case}/shuffled/recording/grip.npz",
+        tracks="blind/{seed}/{case}/shuffled/recording/tracks.npz",
+        split="blind/{seed}/{case}/shuffled/recording/split.json",
+    log:
+        "logs/blind/{seed}/{case}/shuffle.log",
+    benchmark:
+        "benchmarks/blind/{seed}/{case}/shuffle.tsv"
+    conda:
+        "../../envs/physics.yaml"
+    resources:
+        mem_mb=1000,
+    params:
+        own=folder,
+        other=lambda w, input: Path(input.other[0]).parent,
+        code=code("shuffle"),
+    shell:
+        'python "$SURGISIM/stages/shuffle.py" --recording {params.own} --other {params.other}'
+        " --shuffled {output.recording} --rest {output.rest} --fixed {output.fixed} --grip {output.grip}"
+        " --tracks {output.tracks} --split {output.split} --code {params.code} > {log} 2>&1"
+
+
+rule shorten:
+    input:
+        recording=expand("blind/{{seed}}/{{case}}/recording/{name}", name=FILES),
+    output:
+        recording="blind/{seed}/{case}/{shorter}/recording/recording.json",
+        rest="blind/{seed}/{case}/{shorter}/recording/rest.ply",
+        fixed="blind/{seed}/{case}/{shorter}/recording/fixed.json",
+        grip="blind/{seed}/{case}/{shorter}/recording/grip.npz",
+        tracks="blind/{seed}/{case}/{shorter}/recording/tracks.npz",
+        split="blind/{seed}/{case}/{shorter}/recording/split.json",
+    log:
+        "logs/blind/{seed}/{case}/{shorter}/shorten.log",
+    benchmark:
+        "benchmarks/blind/{seed}/{case}/{shorter}/shorten.tsv"
+    conda:
+        "../../envs/physics.yaml"
+    resources:
+        mem_mb=1000,
+    params:
+        recording=folder,
+        settings=lambda w: json.dumps({"end": SHORTER[w.shorter]}),
+        code=code("shorten"),
+    shell:
+        'python "$SURGISIM/stages/shorten.py" --recording {params.recording}'
+        " --shortened {output.recording} --rest {output.rest} --fixed {output.fixed} --grip {output.grip}"
+        " --tracks {output.tracks} --split {output.split}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
+rule diagnosis:
+    input:
+        recording=shown,
+        # Of all cases: nobody diagnoses before every answer is fixed. More cases later do not undo what is diagnosed.
+        seals=ancient("blind/{seed}/seals.txt"),
+    output:
+        diagnosis="blind/{seed}/{case}/{way}/diagnosis.json",
+        physics="blind/{seed}/{case}/{way}/physics.json",
+        mismatch="blind/{seed}/{case}/{way}/mismatch.npz",
+        cloud="blind/{seed}/{case}/{way}/mismatch.ply",
+    log:
+        "logs/blind/{seed}/{case}/{way}/diagnosis.log",
+    benchmark:
+        "benchmarks/blind/{seed}/{case}/{way}/diagnosis.tsv"
+    conda:
+        "../../envs/physics.yaml"
+    threads: 2
+    resources:
+        mem_mb=4000,
+        gpu=0,
+    params:
+        recording=folder,
+        settings=lambda w: json.dumps({**config.get("diagnosis", {}), **WAYS[w.way]}),
+        code=code("diagnosis"),
+    shell:
+        'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
+        " --recording {params.recording} --diagnosis {output.diagnosis} --physics {output.physics}"
+        " --mismatch {output.mismatch} --cloud {output.cloud} --work blind/{wildcards.seed}/{wildcards.case}/{wildcards.way}/work"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
+rule diagnosis_report:
+    input:
+        recording=shown,
+        diagnosis="blind/{seed}/{case}/{way}/diagnosis.json",
+        physics="blind/{seed}/{case}/{way}/physics.json",
+        mismatch="blind/{seed}/{case}/{way}/mismatch.npz",
+    output:
+        page="blind/{seed}/{case}/{way}/diagnosis.html",
+    log:
+        "logs/blind/{seed}/{case}/{way}/diagnosis_report.log",
+    benchmark:
+        "benchmarks/blind/{seed}/{case}/{way}/diagnosis_report.tsv"
+    conda:
+        "../../envs/report.yaml"
+    resources:
+        mem_mb=2000,
+    params:
+        recording=folder,
+        code=code("diagnosis_report"),
+    shell:
+        'python "$SURGISIM/stages/diagnosis_report.py" --recording {params.recording}'
+        " --diagnosis {input.diagnosis} --physics {input.physics} --mismatch {input.mismatch}"
+        " --page {output.page} --code {params.code} > {log} 2>&1"
+
+
+rule score:
+    input:
+        recording=shown,
+        diagnosis="blind/{seed}/{case}/{way}/diagnosis.json",
+        physics="blind/{seed}/{case}/{way}/physics.json",
+        mismatch="blind/{seed}/{case}/{way}/mismatch.npz",
+        seal="blind/{seed}/{case}/seal.txt",
+        seals=ancient("blind/{seed}/seals.txt"),
+        truth="blind/{seed}/{case}/sealed/truth.json",
+        truth_tracks="blind/{seed}/{case}/sealed/truth.npz",
+        salt="blind/{seed}/{case}/sealed/salt.txt",
+    output:
+        score="blind/{seed}/{case}/{way}/score.json",
+    log:
+        "logs/blind/{seed}/{case}/{way}/score.log",
+    benchmark:
+        "benchmarks/blind/{seed}/{case}/{way}/score.tsv"
+    conda:
+        "../../envs/report.yaml"
+    resources:
+        mem_mb=1000,
+    params:
+        recording=folder,
+        code=code("score"),
+    shell:
+        'python "$SURGISIM/stages/score.py" --recording {params.recording}'
+        " --diagnosis {input.diagnosis} --physics {input.physics} --mismatch {input.mismatch}"
+        " --seal {input.seal} --seals {input.seals}"
+        " --truth {input.truth} --truth-tracks {input.truth_tracks} --salt {input.salt}"
+        " --score {output.score} --code {params.code} > {log} 2>&1"
+
+
+rule scoreboard:
+    input:
+        score=every("blind/{seed}/{case}/{way}/score.json"),
+        recording=every("blind/{seed}/{case}/recording/recording.json"),
+        pages=every("blind/{seed}/{case}/{way}/diagnosis.html"),
+    output:
+        board="blind/{seed}/{way}/scoreboard.json",
+        table="blind/{seed}/{way}/scoreboard.csv",
+        page=report(
+            "blind/{seed}/{way}/scoreboard.html",
+            caption="../report/scoreboard.rst",
+            category="concealed recordings",
+            labels={"seed": "{seed}", "way": "{way}"},
+        ),
+    log:
+        "logs/blind/{seed}/{way}/scoreboard.log",
+    benchmark:
+        "benchmarks/blind/{seed}/{way}/scoreboard.tsv"
+    conda:
+        "../../envs/report.yaml"
+    resources:
+        mem_mb=2000,
+    params:
+        recording=lambda w, input: [Path(path).parent for path in input.recording],
+        settings=lambda w: json.dumps(
+            {"pages": f"../{{case}}/{w.way}/diagnosis.html", "seals": COUNT}
+        ),
+        code=code("scoreboard"),
+    shell:
+        'python "$SURGISIM/stages/scoreboard.py" --score {input.score} --recording {params.recording}'
+        " --board {output.board} --table {output.table} --page {output.page}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
+rule blind:
+    input:
+        f"blind/{SEED}/main/scoreboard.html",
+
+
+rule blind_shuffled:
+    input:
+        f"blind/{SEED}/shuffled/scoreboard.html",
+
+
+rule ablations:
+    input:
+        board=lambda w: expand(
+            "blind/{seed}/{way}/scoreboard.json", seed=w.seed, way=BESIDE[w.side]
+        ),
+    output:
+        table="blind/{seed}/{side}.json",
+        page="blind/{seed}/{side}.html",
+    log:
+        "logs/blind/{seed}/{side}.log",
+    benchmark:
+        "benchmarks/blind/{seed}/{side}.tsv"
+    conda:
+        "../../envs/report.yaml"
+    resources:
+        mem_mb=1000,
+    params:
+        settings=lambda w: json.dumps({"ways": BESIDE[w.side]}),
+        code=code("ablations"),
+    shell:
+        'python "$SURGISIM/stages/ablations.py" --board {input.board}'
+        " --table {output.table} --page {output.page}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
+rule blind_ablations:
+    input:
+        f"blind/{SEED}/ablations.html",
+
+
+rule blind_phases:
+    input:
+        f"blind/{SEED}/phases.html",

@@ -1,23 +1,31 @@
 """What the rules share: which clips and variants, where an output lies, which settings and code a stage has."""
 
 import functools
+import json
 import sys
 from pathlib import Path
 
 ROOT = Path(workflow.basedir).parent
 sys.path.insert(0, str(ROOT))
 
+from surgisim.config.base import parse as checked
+from surgisim.config.invent import Invent
 from surgisim.config.whole import PARENTS
 from surgisim.digest import digest
 from surgisim.plan import plan
 from surgisim.problem import Problem
+from surgisim.proof.known.catalogue import catalogue as known_recordings
+from surgisim.proof.shuffle import partner
+
+# What the rules for concealed recordings read of the config, beside the clips' choices.
+BLIND = ("seed", "cases", "invent", "diagnosis")
 
 try:
     PLAN = plan(
         {
             key: value
             for key, value in config.items()
-            if key not in ("clips", "variants")
+            if key not in ("clips", "variants", *BLIND)
         },
         clips=Path(config.get("clips", ROOT / "config" / "clips.tsv")),
         variants=Path(config.get("variants", ROOT / "config" / "variants.yaml")),
@@ -104,3 +112,70 @@ def benchmarks(w):
     """Where the stages of this clip and variant, some of them shared, left their time and memory."""
     homes = ((stage, PLAN.homes[stage, w.clip, w.variant]) for stage in MEASURED)
     return ":".join(f"benchmarks/{w.clip}/{home}/{stage}.tsv" for stage, home in homes)
+
+
+# Concealed recordings (blind.smk): which seed, how many cases, and the files of each.
+SEED, COUNT = int(config.get("seed", 1)), int(config.get("cases", 40))
+FILES = (
+    "recording.json",
+    "rest.ply",
+    "fixed.json",
+    "grip.npz",
+    "tracks.npz",
+    "split.json",
+)
+
+# Ways to diagnose the same cases: the method; the same with one of its parts left out, to see what each is worth; the
+# method on clips that end sooner; and on paths that belong to another case, which must bring naming down to chance.
+ABLATIONS = {
+    "iid": {"noise": "independent"},
+    "no_offset": {"offsets": False},
+    "no_nulls": {"calibrated": False},
+    "no_model_error": {"model_error": 0.0},
+}
+SHORTER = {"until_load": "load", "until_hold": "hold"}
+WAYS = {"main": {}, "shuffled": {}, **dict.fromkeys(SHORTER, {}), **ABLATIONS}
+
+# Which are put side by side on one page.
+BESIDE = {"ablations": ["main", *ABLATIONS], "phases": ["main", *SHORTER]}
+
+# Real recordings with a known cause (known.smk).
+KNOWN = known_recordings()
+
+
+def inventing(w):
+    """Params function: what the phantom may choose from, checked here so that a mistake is said before anything runs."""
+    told = {
+        **config.get("invent", {}),
+        "seed": int(getattr(w, "seed", SEED)),
+        "case": int(w.case),
+    }
+    try:
+        return json.dumps(checked(Invent, told, "config key 'invent'").model_dump())
+    except Problem as problem:
+        raise WorkflowError(str(problem)) from None
+
+
+def shown(w):
+    """The files of the recording that this way of diagnosing gets to see."""
+    changed = w.way == "shuffled" or w.way in SHORTER
+    folder = f"{w.way}/recording" if changed else "recording"
+    return [f"blind/{w.seed}/{w.case}/{folder}/{name}" for name in FILES]
+
+
+def others(w):
+    """The files of the recording whose paths this case gets when they are shuffled."""
+    other = partner(int(w.case), COUNT, int(w.seed))
+    return [f"blind/{w.seed}/{other}/recording/{name}" for name in FILES]
+
+
+def folder(w, input):
+    """Params function: where the rule's recording lies."""
+    return Path(input.recording[0]).parent
+
+
+def every(pattern):
+    """Input function: a file of every case of the run."""
+    return lambda w: expand(
+        pattern, seed=w.seed, case=range(COUNT), way=getattr(w, "way", "main")
+    )

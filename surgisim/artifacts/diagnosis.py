@@ -1,0 +1,36 @@
+"""What a diagnosis says of a recording; the fields are those of format surgisim-diagnosis/1 (docs/diagnosis.md)."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from surgisim.artifacts.base import JsonArtifact, check
+
+VERDICTS = ("named", "equivalence class", "nothing detectable", "unexplained")
+
+
+@dataclass(frozen=True)
+class Diagnosis(JsonArtifact):
+    recording: str
+    verdict: str
+    effects: list[dict[str, Any]]
+    """Each with term, probability, place, time, parameters, runners_up, separating_experiment."""
+    ranking: list[dict[str, Any]]
+    """Every law tried: term, place, log_evidence, probability, cos to the winner, held_out RMS [mm] or null."""
+    detectable_above: dict[str, Any]
+    """{"value", "unit"}: RMS size beyond which an effect would mostly have been seen; and "laws": law -> size."""
+    missing_phases: list[str]
+    fit: dict[str, Any]
+    """RMS distance between recording and prediction: noise_floor, before, after, placebo, flexible, unit."""
+    held_out: dict[str, Any]
+    unexplained_fraction: float
+    words: str
+    base: dict[str, Any]
+    """The base's parameters: value, low, high, unit."""
+    noise: dict[str, Any]
+    """The tracks' noise as estimated."""
+    global_test: dict[str, Any]
+    """Evidence of the best law, what nulls reach, and the threshold."""
+    format: str = "surgisim-diagnosis/1"
+
+    def __post_init__(self) -> None:
+        check(self.verdict in VERDICTS, f"Diagnosis: verdict '{self.verdict}' is none of {VERDICTS}.")

@@ -1,0 +1,34 @@
+"""Settings of a diagnosis."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from surgisim.config.base import Settings
+
+
+class Diagnosing(Settings):
+    """What is tried, and how noise is taken into account."""
+
+    seed: int = Field(0, ge=0)
+    """Of the simulated nulls and of whatever else is drawn [1]."""
+    grid: float = Field(0.165, gt=0.04, le=0.5)
+    """Spacing of the grid over the cube root of the body's volume [1]."""
+    nulls: int = Field(24, ge=4, le=400)
+    """Residuals of nothing but noise that go through the same search [1]."""
+    refine: int = Field(4, ge=1, le=16)
+    """Laws that the engine itself runs again, best first [1]."""
+    free: int = Field(1, ge=0, le=16)
+    """Of them, laws that are fitted with place, time and form free [1]."""
+    second: bool = True
+    """Whether a second effect is looked for [1]."""
+    noise: Literal["correlated", "independent"] = "correlated"
+    """How tracking errors are taken to be related [-]."""
+    offsets: bool = True
+    """Whether every point may have a constant error of its own [1]."""
+    model_error: float = Field(1.0, ge=0, le=10)
+    """Times the measured error of the simulator [1]."""
+    calibrated: bool = True
+    """Whether the thresholds of the calibration are used; without, any evidence above zero counts [1]."""
+    experiment: bool = True
+    """Whether a separating manipulation is simulated [1]."""

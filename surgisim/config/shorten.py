@@ -1,0 +1,10 @@
+"""Settings of shortening."""
+
+from typing import Literal
+
+from surgisim.config.base import Settings
+
+
+class Shorten(Settings):
+    end: Literal["load", "hold"] = "hold"
+    """Last phase of the first grasp that may be fitted [name]."""

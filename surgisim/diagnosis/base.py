@@ -1,0 +1,209 @@
+"""The honest base: few numbers, fitted together with the nuisances, before anything is called missing.
+
+Stiffness does not matter where tissue is driven by displacements and comes to rest between frames; it is told,
+with the viscosity, by what a release looks like. So Poisson's ratio is searched through the tangent stiffness of the
+last run, E and eta through short runs that begin just before the first release; where nothing is
+released, through whole runs.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.metric import Metric, metric
+from surgisim.diagnosis.noise import Whitener
+from surgisim.diagnosis.tangent import Tangent, base_piola, tangent
+from surgisim.mpm.grip import Drive
+from surgisim.mpm.setup import Prepared, Values
+from surgisim.mpm.simulator import Run
+
+TERMS = ("neo_hookean_ciarlet", "newtonian")
+START = np.array([np.log(3e3), 0.45, np.log(3e-3)])
+"""log E [Pa], nu, log eta / E [s]."""
+SPREAD = np.array([0.8, 0.03, 0.8])
+LOW, HIGH = np.array([np.log(5e2), 0.30, np.log(3e-4)]), np.array([np.log(5e4), 0.485, np.log(3e-2)])
+STEP = np.array([0.2, 0.01, 0.3])
+SCAN = (-1.0, -0.35, 0.3, 1.0)
+"""Where the descent may start, in logarithms of E and of eta / E away from START."""
+DESCENTS = 8
+"""Steps of it at most."""
+SAFETY = 0.8
+AFTER = 0.5
+"""How long a short run goes on after the release [s]."""
+
+
+@dataclass(frozen=True)
+class Base:
+    x: np.ndarray
+    """(3,)"""
+    prepared: Prepared
+    drive: Drive
+    run: Run
+    simulated: np.ndarray
+    """Displacement of the points over the whole clip [m], (K, T, 3)."""
+    tangent: Tangent
+    slopes: np.ndarray
+    """Of the points by x, at one prior standard deviation [m], (3, K, T_fit, 3)."""
+    spread: np.ndarray
+    """Posterior standard deviation of x, (3,)."""
+
+    @property
+    def values(self) -> Values:
+        return values_of(self.x)
+
+
+def values_of(x: np.ndarray) -> Values:
+    E, nu = float(np.exp(x[0])), float(x[1])
+    return {TERMS[0]: {"E": E, "nu": min(nu, 0.485)}, TERMS[1]: {"eta": E * float(np.exp(x[2]))}}
+
+
+def fit_base(
+    clip: Clip, whiten: Whitener, nuisances: np.ndarray, memo: Memo, *, rounds: int = 1,
+    say: Callable[[str], None] = lambda text: None,
+) -> Base:  # fmt: skip
+    """Least squares over E, nu and eta, given nuisances whitened at one standard deviation, (N, M)."""
+    x, until = START.copy(), clip.until
+    prepared = clip.prepared(TERMS)
+    carry = prepared.simulator.carry(clip.rest)
+    space = metric(nuisances)
+    for iteration in range(rounds + 1):
+        last = iteration == rounds
+        say(f"base, run {iteration + 1}: E {np.exp(x[0]):.0f} Pa, nu {x[1]:.3f}, eta {np.exp(x[0] + x[2]):.2f} Pa s")
+        drive, run = simulate(prepared, clip, x, memo, clip.frames if last else until)
+        simulated = carried(carry, run)
+        near = tangent(prepared, values_of(x), drive, run, clip.rest, until)
+        around = _Around(
+            clip, whiten, space, memo, prepared, carry, x, run, simulated[:, :until], _by_poisson(prepared, near, x)
+        )
+        if not last:
+            x = around.descend(around.start() if iteration == 0 else x, say)
+    slopes = around.slopes(x)
+    spread = np.sqrt(np.diag(np.linalg.inv(around.normal(slopes))))
+    return Base(x, prepared, drive, run, simulated, near, slopes * SPREAD[:, None, None, None], spread)
+
+
+@dataclass(frozen=True)
+class _Around:
+    """Tracks near a run at `x`: nu moves them along its slope, E and eta by short runs from the run's own states."""
+
+    clip: Clip
+    whiten: Whitener
+    space: Metric
+    memo: Memo
+    prepared: Prepared
+    carry: object
+    x: np.ndarray
+    run: Run
+    simulated: np.ndarray
+    by_poisson: np.ndarray
+
+    def tracks(self, y: np.ndarray) -> np.ndarray:
+        """Displacement of the points [m], (K, T_fit, 3)."""
+        first, last = _window(self.clip)
+        rates = np.array([y[0], self.x[1], y[2]])
+        what = ["short", self.x.tolist(), rates.tolist(), first, last]
+        seen = self.memo(
+            what, lambda: {"seen": _short(self.clip, self.prepared, rates, self.run, self.carry, first, last)}
+        )["seen"]
+        result = self.simulated.copy()
+        result[:, first + 1 : last + 1] = seen
+        return result + (y[1] - self.x[1]) * self.by_poisson
+
+    def left(self, y: np.ndarray) -> np.ndarray:
+        """Whitened residual, (N,)."""
+        return self.whiten(self.clip.moved[:, : self.clip.until] - self.tracks(y))
+
+    def cost(self, y: np.ndarray, left: np.ndarray) -> float:
+        return float(self.space.gram(left[:, None], left[:, None])[0, 0] + (((y - START) / SPREAD) ** 2).sum())
+
+    def slopes(self, y: np.ndarray) -> np.ndarray:
+        """Derivative of the points' displacement by y [m], (3, K, T_fit, 3)."""
+        middle = self.tracks(y)
+        rates = {k: (self.tracks(y + STEP * np.eye(3)[k]) - middle) / STEP[k] for k in (0, 2)}
+        return np.stack([rates[0], self.by_poisson, rates[2]])
+
+    def normal(self, slopes: np.ndarray) -> np.ndarray:
+        J = self.whiten(slopes).T
+        return self.space.gram(J, J) + np.diag(1 / SPREAD**2)
+
+    def start(self) -> np.ndarray:
+        """The best of a few stiffnesses and viscosities: a ring-down misfits by whole periods."""
+        tries = [np.clip(self.x + np.array([e, 0.0, lag]), LOW, HIGH) for e in SCAN for lag in SCAN]
+        return min(tries, key=lambda y: self.cost(y, self.left(y)))
+
+    def descend(self, y: np.ndarray, say: Callable[[str], None]) -> np.ndarray:
+        """Levenberg-Marquardt from y."""
+        left = self.left(y)
+        cost, damping = self.cost(y, left), 1e-2
+        for _ in range(DESCENTS):
+            say(f"base: E {np.exp(y[0]):.0f} Pa, nu {y[1]:.3f}, eta {np.exp(y[0] + y[2]):.2f} Pa s")
+            slopes = self.slopes(y)
+            normal = self.normal(slopes)
+            pull = self.space.gram(self.whiten(slopes).T, left[:, None])[:, 0] - (y - START) / SPREAD**2
+            for _ in range(4):
+                step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), pull)
+                there = np.clip(y + np.clip(step, -1.2 * SPREAD, 1.2 * SPREAD), LOW, HIGH)
+                left_there = self.left(there)
+                cost_there = self.cost(there, left_there)
+                if cost_there < cost:
+                    break
+                damping *= 8
+            else:
+                return y
+            done = cost - cost_there < 0.5
+            y, left, cost, damping = there, left_there, cost_there, max(damping / 4, 1e-4)
+            if done:
+                return y
+        return y
+
+
+def carried(carry, run: Run) -> np.ndarray:
+    """Displacement of points [m], (K, T, 3)."""
+    return np.stack([carry @ u.astype(float) for u in run.u], 1)
+
+
+def simulate(prepared: Prepared, clip: Clip, x: np.ndarray, memo: Memo, frames: int) -> tuple[Drive, Run]:
+    """The base up to frame `frames`, exclusive."""
+    values = values_of(x)
+    drive = base_drive(prepared, clip, values)
+    made = memo(
+        ["base", x.tolist(), frames],
+        lambda: vars(prepared.simulator.run(prepared.theta(values), drive, last=frames - 1)),
+    )
+    return drive, Run(**made)
+
+
+def base_drive(prepared: Prepared, clip: Clip, values: Values) -> Drive:
+    per_frame = prepared.per_frame(values, clip.fps, SAFETY)
+    return prepared.drive(clip.motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames)
+
+
+def _by_poisson(prepared, near: Tangent, x) -> np.ndarray:
+    """Derivative of the points' displacement by nu [m], (K, T_fit, 3)."""
+    values, more = values_of(x), values_of(x - [0, 1e-4, 0])
+    loads = []
+    for frame in near.frames:
+        F = near.gradient(frame)
+        loads.append(near.of_stress((base_piola(prepared, values, F) - base_piola(prepared, more, F)) / 1e-4))
+    return near.over_time(near.at_states(np.stack(loads)[:, None])[:, 0])
+
+
+def _short(clip, prepared, x, run, carry, first, last) -> np.ndarray:
+    values = values_of(x)
+    drive = base_drive(prepared, clip, values)
+    begin = run.state(first) if first else None
+    moved = prepared.simulator.run(prepared.theta(values), drive, begin=begin, first=first, last=last)
+    return carried(carry, moved)[:, 1:]
+
+
+def _window(clip: Clip) -> tuple[int, int]:
+    """From just before the first release for a while; everything where nothing is released."""
+    active = clip.motion.active[:, : clip.until] if len(clip.motion.active) else np.zeros((0, clip.until), bool)
+    ends = [int(np.flatnonzero(a)[-1]) for a in active if a.any()]
+    ends = [e for e in ends if e < clip.until - 3]
+    if not ends:
+        return 0, clip.until - 1
+    return max(min(ends) - 1, 0), min(clip.until - 1, min(ends) + round(AFTER * clip.fps))

@@ -1,0 +1,26 @@
+"""Numbers learned on calibration recordings (seeds 901-903 of the blind generator), and used on all others.
+
+They were read off cases that conceal nothing, one effect or an effect outside the catalogue, none of which is ever
+reported as a result. docs/diagnosis.md tells how.
+"""
+
+THRESHOLD = 12.0
+"""log evidence of the best law below which nothing is called detectable."""
+TEMPERATURE = 8.0
+"""By which differences of log evidence are divided before they become probabilities: signatures are not exact."""
+MISFIT = 0.05
+"""Share of the explained chi square that signatures of the right law leave wrong."""
+EXPLAINED = 0.55
+"""Share of the explainable misfit that a law must explain to be named."""
+RIVAL = 0.7
+"""Share of the best law's gain beyond which the engine runs another law too."""
+SLACK = 120.0
+"""chi square that a smooth field gains where nothing is hidden, beyond simulated nulls: the simulator's error."""
+SECOND = 0.12
+"""Share of it that a second law must add."""
+ALIKE = 0.85
+"""|cos| of whitened signatures beyond which two laws are not told apart."""
+EXPLAINED_WELL = 0.9
+"""Share beyond which no second law is looked for."""
+SURE = 0.5
+"""Probability that a law must have to be named alone."""

@@ -1,0 +1,182 @@
+"""A recording as the diagnosis sees it: points that the body carries, how they moved, which frames may be fitted."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from surgisim.artifacts.body import Body
+from surgisim.artifacts.motion import Motion
+from surgisim.mpm.setup import Prepared, prepare
+from surgisim.problem import Problem
+from surgisim.recordings.recording import Recording
+
+CLEAR = 1.3
+"""Radii of a grip within which points are left out: nobody's solution is to be believed at the skin of a grip."""
+DENSITY = 1050.0
+"""Of tissue, where the recording gives none [kg/m^3]."""
+SHARE = 0.165
+"""Spacing of the grid over the cube root of the body's volume."""
+SETTLES = 4
+"""Frames after a release that are not taken as still."""
+QUIET = 1.6
+"""Times the step of the quietest fifth of the frames, below which a frame counts as quiet where nothing is gripped."""
+MOST = 120
+"""Points that are used at most; neighbours' errors are alike, so more of them tell little more."""
+LEAST_SEEN = 0.3
+"""Share of the fitted frames in which a point must be seen."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """K points in T frames."""
+
+    recording: Recording
+    body: Body
+    kept: np.ndarray
+    """Which of the recording's points are used, (K,) int."""
+    rest: np.ndarray
+    """Where they sit on the body [m], (K, 3)."""
+    seen: np.ndarray
+    """(K, T) bool."""
+    moved: np.ndarray
+    """Observed displacement [m], (K, T, 3), zero where not seen."""
+    until: int
+    """First frame that is not fitted."""
+    normal: np.ndarray
+    """Out of the base towards the observed side, (3,)."""
+
+    @property
+    def frames(self) -> int:
+        return self.moved.shape[1]
+
+    @property
+    def fps(self) -> float:
+        return self.recording.fps
+
+    @property
+    def motion(self) -> Motion:
+        return self.recording.motion
+
+    @property
+    def density(self) -> float:
+        return self.recording.density or DENSITY
+
+    @property
+    def time(self) -> np.ndarray:
+        """[s], (T,)"""
+        return np.arange(self.frames) / self.fps
+
+    def prepared(self, terms: tuple[str, ...], threads: int = 1, motion: Motion | None = None) -> Prepared:
+        """The body on its grid with these laws."""
+        grips = self.motion if motion is None else motion
+        # What begins settled hangs in balance with its weight; what is let go does not.
+        falls = self.recording.starts == "released" and self.recording.gravity is not None
+        return prepare(
+            self.body, terms, density=self.density, carried=self.rest, grips=grips if len(grips.radius) else None,
+            threads=threads, gravity=self.recording.gravity if falls else (0.0, 0.0, 0.0),
+        )  # fmt: skip
+
+    def quiet(self) -> np.ndarray:
+        """Frames in which tissue is still or moves slowly: what the noise is read from, (T,) bool."""
+        if not len(self.motion.radius):
+            # Nobody says when; the quietest of the frames do.
+            step = np.linalg.norm(np.diff(self.moved, axis=1, prepend=self.moved[:, :1]), axis=-1)
+            both = self.seen & np.roll(self.seen, 1, axis=1)
+            middle = np.array([np.median(s[b]) if b.any() else np.inf for s, b in zip(step.T, both.T, strict=True)])
+            return middle < QUIET * np.percentile(middle[1 : self.until], 20)
+        phase = self.phases()
+        still = phase != PHASES.index("load")
+        for frame in np.flatnonzero((phase == PHASES.index("release")) & (np.roll(phase, 1) != phase)):
+            still[frame : frame + SETTLES] = False
+        return still
+
+    def phases(self) -> np.ndarray:
+        """Index into PHASES of every frame, (T,)."""
+        active = self.motion.active.any(0) if len(self.motion.active) else np.zeros(self.frames, bool)
+        speed = speed_of(self.motion, self.fps, self.frames)
+        quick = speed > 0.05 * max(speed.max(), 1e-9)
+        begun = np.maximum.accumulate(active)
+        phase = np.zeros(self.frames, int)
+        phase[active & quick] = PHASES.index("load")
+        phase[active & ~quick] = PHASES.index("hold")
+        phase[begun & ~active] = PHASES.index("release")
+        return phase
+
+
+PHASES = ("rest", "load", "hold", "release")
+
+
+def speed_of(motion: Motion, fps: float, frames: int) -> np.ndarray:
+    """Fastest active grip at every frame [m/s], (T,)."""
+    if not len(motion.active):
+        return np.zeros(frames)
+    speed = np.linalg.norm(np.gradient(motion.position, axis=1), axis=-1) * fps
+    return np.where(motion.active, speed, 0.0).max(0)
+
+
+def clip_of(recording: Recording, *, share: float = SHARE) -> Clip:
+    """Lay a grid through the body, choose points and frames.
+
+    share: spacing of the grid over the cube root of the body's volume. Raises Problem where fewer than 4 points
+    remain, or where the recording has fewer than 8 frames to fit.
+    """
+    mesh, motion = recording.mesh, recording.motion
+    thick = 2 * mesh.volume / mesh.area
+    spacing = min(share * np.cbrt(mesh.volume), 0.9 * thick)
+    body = recording.body(float(spacing))
+    until = fitted_until(recording)
+    rest = recording.attached()
+    near = np.linalg.norm(rest[:, None] - body.rest[None].astype(float), axis=-1).min(1)
+    usable = near < 1.5 * spacing
+    for center, radius in zip(motion.center_rest, motion.radius, strict=True):
+        usable &= np.linalg.norm(rest - center, axis=1) > CLEAR * radius
+    usable &= recording.visible[:, :until].mean(1) > LEAST_SEEN
+    kept = np.flatnonzero(usable)
+    if len(kept) < 4:
+        raise Problem(
+            f"recording {recording.name}: {len(kept)} of {len(rest)} points lie on the body, outside the grips, and "
+            "are seen often enough; at least 4 are needed to tell what was left out."
+        )
+    if until < 8:
+        raise Problem(
+            f"recording {recording.name}: {until} frames may be fitted, at least 8 are needed. Mend split.json."
+        )
+    kept = kept[_apart(rest[kept], recording.visible[kept, :until].mean(1), MOST)]
+    seen = recording.visible[kept].copy()
+    moved = recording.points[kept].astype(float) - rest[kept][:, None]
+    moved = np.where(seen[..., None], moved, 0.0)
+    return Clip(recording, body, kept, rest[kept], seen, moved, until, _normal(body, rest[kept]))
+
+
+def fitted_until(recording: Recording) -> int:
+    """The split's, or what precedes the second grasp, or seven tenths of the frames."""
+    if recording.split:
+        return recording.split["fit"][1]
+    active = recording.motion.active
+    first = sorted(int(a.argmax()) for a in active if a.any())
+    if len(first) > 1 and first[1] > 8:
+        return first[1] - 2
+    return max(1, round(0.7 * recording.frames))
+
+
+def _apart(rest: np.ndarray, seen: np.ndarray, most: int) -> np.ndarray:
+    """Which points to use, in their order: the best seen first, then always the one farthest from all others."""
+    if len(rest) <= most:
+        return np.arange(len(rest))
+    chosen = [int(seen.argmax())]
+    nearest = np.linalg.norm(rest - rest[chosen[0]], axis=1)
+    while len(chosen) < most:
+        chosen.append(int((nearest * (0.3 + seen)).argmax()))
+        nearest = np.minimum(nearest, np.linalg.norm(rest - rest[chosen[-1]], axis=1))
+    return np.sort(chosen)
+
+
+def _normal(body: Body, rest: np.ndarray) -> np.ndarray:
+    """The thin direction of what is held (or of the body), pointing from there to the observed points."""
+    mine = body.rest[body.held].astype(float) if body.held.sum() > 3 else body.rest.astype(float)
+    _, _, axes = np.linalg.svd(mine - mine.mean(0), full_matrices=False)
+    away = rest.mean(0) - mine.mean(0)
+    normal = axes[2] if body.held.any() and abs(axes[2] @ away) > 0.5 * np.linalg.norm(away) else away
+    normal = normal * np.sign(normal @ away or 1.0)
+    size = np.linalg.norm(normal)
+    return normal / size if size > 0 else np.array([0.0, 0.0, 1.0])

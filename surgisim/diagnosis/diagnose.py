@@ -1,0 +1,214 @@
+"""The whole diagnosis of one recording: base, noise, search, refits, verdict (docs/diagnosis.md)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from surgisim.artifacts.diagnosis import Diagnosis
+from surgisim.artifacts.mismatch import Mismatch
+from surgisim.artifacts.physics import Physics
+from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis import calibration, nuisance, verdict
+from surgisim.diagnosis.base import Base, fit_base
+from surgisim.diagnosis.candidates import Parts, blocks, costly
+from surgisim.diagnosis.clip import Clip, clip_of
+from surgisim.diagnosis.evidence import Finding, by_law, judge
+from surgisim.diagnosis.flexible import flexible
+from surgisim.diagnosis.laws import law_of, respond
+from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.metric import Metric, metric
+from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
+from surgisim.diagnosis.refine import refined
+from surgisim.diagnosis.sharpen import finer
+from surgisim.mpm.simulator import Breakdown
+from surgisim.recordings.recording import Recording
+
+Progress = Callable[[float, float, str], None]
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A law as the engine runs it, fitted."""
+
+    finding: Finding
+    amplitude: np.ndarray
+    response: np.ndarray
+    """What it adds to the base at this amplitude over the whole clip [m], (K, T, 3)."""
+    gain: float
+    log_evidence: float
+    free: bool = False
+    """Whether its place, time and form were fitted too."""
+
+    @property
+    def term(self) -> str:
+        return self.finding.hypothesis.term
+
+
+@dataclass(frozen=True)
+class Case:
+    """What all steps share."""
+
+    clip: Clip
+    settings: Diagnosing
+    noise: Noise
+    whiten: Whitener
+    base: Base
+    space: Metric
+    memo: Memo
+    z: np.ndarray
+    """Whitened residual of the base, (N,)."""
+    nulls: np.ndarray
+    """(N, D)"""
+
+
+def diagnose(
+    recording: Recording, settings: Diagnosing, progress: Progress, memo: Memo
+) -> tuple[Diagnosis, Physics, Mismatch]:
+    """What the recording's simulation lacks. Raises Problem where the recording cannot be used."""
+    clip = clip_of(recording, share=settings.grid)
+    progress(0.01, 1, f"noise of {len(clip.kept)} points on {clip.until} frames")
+    case = prepare_case(clip, settings, memo, progress)
+    findings = search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.4 * s, 1, text))
+    laws = by_law(findings)
+    bend = flexible(case.clip, case.whiten, case.space, case.z, case.nulls)
+    detected = max(entry[0] for entry in laws.values()) > threshold(laws, settings)
+    if detected and max(f.gain for f in findings) < calibration.EXPLAINED_WELL * verdict.explainable(bend):
+        parts = costly(clip, case.base, memo)
+        findings += search(case, case.z, case.nulls, lambda s, text: progress(0.62, 1, text), parts)
+        laws = by_law(findings)
+    ranked, refits = sorted(laws, key=lambda term: -laws[term][0]), []
+    if detected:
+        rivals = [t for t in ranked if laws[t][2][0].gain > calibration.RIVAL * laws[ranked[0]][2][0].gain]
+        for n, term in enumerate(rivals[: settings.refine]):
+            progress(0.65 + 0.2 * n / settings.refine, 1, f"the engine with {term}")
+            fine, evidence = sharpened(case, laws[term], case.z)
+            refits.append(refit(case, fine, evidence, case.z))
+        refits.sort(key=lambda r: -r.log_evidence)
+        for n, one in enumerate(refits[: settings.free]):
+            done = 0.75 + 0.1 * n / settings.free
+            refits[n] = freed(case, one, case.z, lambda text, done=done: progress(done, 1, text))
+        refits.sort(key=lambda r: -r.log_evidence)
+    second = None
+    if detected and settings.second and refits[0].gain < calibration.EXPLAINED_WELL * verdict.explainable(bend):
+        progress(0.86, 1, f"what {refits[0].term} leaves")
+        second = another(case, refits[0], progress)
+    progress(0.95, 1, "verdict")
+    return verdict.write(case, laws, ranked, refits, second, bend, detected)
+
+
+def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress) -> Case:
+    """Noise, base, nuisances."""
+    until = clip.until
+    fitted = slice(0, until)
+    noise = estimate(
+        clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, clip.quiet()[fitted], clip.recording.sigma[clip.kept]
+    )
+    if settings.noise == "independent":
+        noise = replace(
+            noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0
+        )
+    whiten = whitener(noise, clip.rest, clip.seen[:, fitted], settings.offsets)
+    wrong = (
+        whiten(nuisance.simulator(clip, until, settings.model_error)).T
+        if settings.model_error
+        else np.zeros((3 * until * len(clip.kept), 1))
+    )
+    base = fit_base(clip, whiten, wrong, memo, say=lambda text: progress(0.1, 1, text))
+    parts = [wrong, whiten(nuisance.camera(clip, base.simulated[:, fitted])).T, whiten(base.slopes).T]
+    if settings.model_error and len(clip.motion.radius):
+        parts.append(whiten(nuisance.grips(clip, base.tangent, until)).T)
+    space = metric(np.concatenate(parts, 1))
+    z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
+    nulls = space.draw(np.random.default_rng(settings.seed), settings.nulls, whiten.without_constant)
+    return Case(clip, settings, noise, whiten, base, space, memo, z, nulls)
+
+
+def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts | None = None) -> list[Finding]:
+    """Every hypothesis of `parts` (or of all that is cheap) against a whitened residual."""
+    residuals = np.concatenate([z[:, None].astype(np.float32), nulls], 1)
+    parts, found, source = list(parts or blocks(case.clip, case.base)), [], 0
+    for n, (name, make) in enumerate(parts):
+        progress(n / len(parts), f"trying {name} ({n + 1} of {len(parts)})")
+        for block in make():
+            found += judge(block, case.whiten, case.space, residuals, source, case.clip.seen[:, : case.clip.until])
+            source += 1
+    return found
+
+
+def threshold(laws: dict, settings: Diagnosing) -> float:
+    """log evidence that the best law must exceed."""
+    highest = np.max([nulls for _, nulls, _ in laws.values()], 0)
+    if not settings.calibrated:
+        return 0.0
+    return max(calibration.THRESHOLD, float(np.quantile(highest, 0.95)))
+
+
+def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: int = 2) -> Refit:
+    """The law in the engine, its strength by secants of its response; what the tangent left out is put back.
+
+    Where the engine breaks down, a weaker law is tried once, then the tangent's word is taken.
+    """
+    clip, base, until = case.clip, case.base, case.clip.until
+    amplitude, gain, response = finding.amplitude.copy(), -np.inf, None
+    for _ in range(rounds):
+        try:
+            moved = respond(clip, base, law_of(finding.hypothesis, amplitude, clip), case.memo)
+        except Breakdown:
+            amplitude = 0.5 * amplitude
+            continue
+        change = moved - base.simulated
+        white = case.whiten(change[:, :until])[:, None]
+        G, b = float(case.space.gram(white, white)[0, 0]), float(case.space.gram(white, z[:, None])[0, 0])
+        best = b / max(G, 1e-12)
+        # Near its best strength a response may be scaled; far from it, only another run tells.
+        scale = float(np.clip(best, 0.7, 1.4))
+        mine = 2 * scale * b - scale**2 * G
+        if mine > gain:
+            gain, response, kept = mine, scale * change, scale * amplitude
+        if abs(best - 1) < 0.1 or best <= 0:
+            break
+        amplitude = amplitude * float(np.clip(best, 0.4, 2.5))
+    if response is None:
+        return Refit(finding, finding.amplitude, np.zeros_like(base.simulated), 0.0, -np.inf)
+    return Refit(finding, kept, response, gain, evidence + 0.5 * (gain - finding.gain))
+
+
+def freed(case: Case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
+    """The same law with everything about it free; as it was where that gains nothing."""
+    start = one.finding.hypothesis, one.amplitude
+    found = refined(case.clip, case.base, case.whiten, case.space, case.memo, z, start, say)
+    if found is None or found.gain <= one.gain:
+        return one
+    finding = replace(one.finding, hypothesis=found.hypothesis, spread=found.spread)
+    better = {"finding": finding, "amplitude": found.amplitude, "response": found.response, "gain": found.gain}
+    return replace(one, **better, log_evidence=one.log_evidence + 0.5 * (found.gain - one.gain), free=True)
+
+
+def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:
+    """A law's best finding on two finer lattices, and the law's evidence with what that gains."""
+    evidence, _, findings = law
+    best = findings[0]
+    residual, seen = z[:, None].astype(np.float32), case.clip.seen[:, : case.clip.until]
+    for step in (1.0, 0.5):
+        for block in finer(case.clip, case.base, best.hypothesis, step):
+            found = judge(block, case.whiten, case.space, residual, -1, seen)
+            best = max([best, *(f for f in found if f.hypothesis.term == best.hypothesis.term)], key=lambda f: f.gain)
+    return best, evidence + 0.5 * (best.gain - findings[0].gain)
+
+
+def another(case: Case, first: Refit, progress: Progress) -> tuple[Refit, float] | None:
+    """The second effect that pays most once the first is there, and its log evidence; None where none does."""
+    until = case.clip.until
+    white = case.whiten(first.response[:, :until])
+    # The first law's strength is open again: its signature joins the nuisances.
+    space = metric(np.concatenate([case.space.columns, white[:, None]], 1))
+    left = replace(case, space=space)
+    z = case.z - white
+    found = search(left, z, case.nulls, lambda s, text: progress(0.86 + 0.07 * s, 1, text))
+    laws = by_law([f for f in found if f.hypothesis.term != first.term])
+    best = max(laws, key=lambda term: laws[term][0])
+    if laws[best][0] < threshold(laws, case.settings):
+        return None
+    fine, evidence = sharpened(left, laws[best], z)
+    return refit(left, fine, evidence, z), evidence

@@ -1,0 +1,61 @@
+"""How far prediction and recording lie apart, on frames that were fitted and on those that were not."""
+
+import numpy as np
+
+from surgisim.diagnosis.flexible import smooth_part
+
+
+def residual(case, simulated, nan: bool = True) -> np.ndarray:
+    """Recording less prediction less each point's own constant [m], (K, T, 3)."""
+    clip, until = case.clip, case.clip.until
+    left = np.where(clip.seen[..., None], clip.moved - simulated, 0.0)
+    if case.settings.offsets:
+        count = np.maximum(clip.seen[:, :until].sum(1), 1)
+        left = left - (left[:, :until].sum(1) / count[:, None])[:, None]
+    return np.where(clip.seen[..., None], left, np.nan if nan else 0.0)
+
+
+def rms(case, simulated) -> tuple[float, float | None]:
+    """On fitted frames and on those held out [mm]."""
+    left, until = residual(case, simulated), case.clip.until
+    square = (left**2).sum(-1)
+    fitted = 1e3 * float(np.sqrt(np.nanmean(square[:, :until])))
+    if case.clip.frames == until or not case.clip.seen[:, until:].any():
+        return fitted, None
+    return fitted, 1e3 * float(np.sqrt(np.nanmean(square[:, until:])))
+
+
+def errors(case, after, placebo) -> tuple[dict, dict]:
+    clip, until = case.clip, case.clip.until
+    floor = 1e3 * np.sqrt(3) * case.noise.sigma
+    rows = {name: rms(case, s) for name, s in (("before", case.base.simulated), ("after", after), ("placebo", placebo))}
+    left = residual(case, case.base.simulated, False)
+    parts = []
+    for span in (slice(0, until), slice(until, clip.frames)):
+        seen = clip.seen[:, span]
+        if not seen.any():
+            parts.append(None)
+            continue
+        smooth = smooth_part(clip, left[:, span], seen)
+        parts.append(1e3 * float(np.sqrt(((left[:, span] - smooth)[seen] ** 2).sum(-1).mean())))
+    result = []
+    for k in (0, 1):
+        result.append(
+            {"noise_floor": float(floor), **{n: r[k] for n, r in rows.items()}, "flexible": parts[k], "unit": "mm"}
+        )
+    low, high = _bootstrap(case, after)
+    result[1]["gain_low"], result[1]["gain_high"] = low, high
+    return result[0], result[1]
+
+
+def _bootstrap(case, after, draws: int = 200) -> tuple[float | None, float | None]:
+    """90 % interval of what the law takes off the held-out mean square [mm^2], points drawn again."""
+    clip, until = case.clip, case.clip.until
+    if clip.frames == until or not clip.seen[:, until:].any():
+        return None, None
+    square = [(residual(case, s, False)[:, until:] ** 2).sum((1, 2)) for s in (case.base.simulated, after)]
+    count = clip.seen[:, until:].sum(1)
+    rng = np.random.default_rng([case.settings.seed, 2])
+    chosen = rng.integers(0, len(count), (draws, len(count)))
+    gains = 1e6 * (square[0] - square[1])[chosen].sum(1) / np.maximum(count[chosen].sum(1), 1)
+    return float(np.quantile(gains, 0.05)), float(np.quantile(gains, 0.95))

@@ -1,0 +1,89 @@
+"""How much better a law explains what is left than nothing does.
+
+For a hypothesis with signatures S (N, H), residual r and the metric of noise and nuisances, and amplitudes drawn from
+N(0, L) beforehand,
+
+    log B = 1/2 b^T (G + L^-1)^-1 b - 1/2 log det(1 + L^1/2 G L^1/2),   G = <S, S>, b = <S, r>
+
+and, where an amplitude must be positive, plus log of the share of its posterior above zero over the prior's half. L
+gives every signature the RMS sizes of SIZES, equally likely. A law's evidence is the mean of B over the places, times
+and forms in which it was tried: a law that may be anywhere and anything pays for it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import log_ndtr, logsumexp
+
+from surgisim.diagnosis.form import Block
+from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.metric import Metric
+
+SIZES = (1.5e-4, 4e-4, 1e-3)
+"""RMS length of what an effect does to the points, beforehand [m]."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    hypothesis: Hypothesis
+    log_evidence: float
+    amplitude: np.ndarray
+    """Most likely, (H,)."""
+    spread: np.ndarray
+    gain: float
+    """Of twice the log likelihood: the part of the misfit's chi square that it takes away."""
+    nulls: np.ndarray
+    """log evidence on residuals of nothing, (D,)."""
+    source: int
+    """Number of its block."""
+    size: float
+    """RMS of its signature at the most likely amplitude [m]."""
+
+
+def judge(block: Block, whiten, space: Metric, residuals: np.ndarray, source: int, seen: np.ndarray) -> list[Finding]:
+    """Every hypothesis of a block against residuals (N, 1 + D), the recording's first, then nulls."""
+    white = whiten(block.columns).T.astype(np.float32)
+    gram = space.gram(white, white)
+    shadow = space.gram(white, residuals)
+    mask = seen[None, :, :, None]
+    plain = np.einsum("ckti,dkti->cd", block.columns * mask, block.columns, optimize=True) / seen.sum()
+    return [weigh(h, gram, shadow, plain, source) for h in block.hypotheses]
+
+
+def weigh(h: Hypothesis, gram: np.ndarray, shadow: np.ndarray, plain: np.ndarray, source: int) -> Finding:
+    G, b = h.mix.T @ gram @ h.mix, h.mix.T @ shadow
+    size = h.mix.T @ plain @ h.mix
+    rms = np.sqrt(np.maximum(np.diag(size), 1e-30))
+    parts, best = [], None
+    for wanted in SIZES:
+        L = wanted / rms / np.sqrt(len(rms))
+        A = np.eye(len(L)) + L[:, None] * G * L[None]
+        y = L[:, None] * b
+        x = np.linalg.solve(A, y)
+        logs = 0.5 * (y * x).sum(0) - 0.5 * np.linalg.slogdet(A)[1]
+        sd = np.sqrt(np.diag(np.linalg.inv(A)))
+        if h.sign and len(L) == 1:
+            logs = logs + log_ndtr(x[0] / sd[0]) + np.log(2)
+        parts.append(logs)
+        if best is None or logs[0] > best[0]:
+            amplitude = L * x[:, 0]
+            if h.sign and len(L) == 1:
+                amplitude = np.maximum(amplitude, 0)
+            best = (logs[0], amplitude, L * sd)
+    logs = logsumexp(parts, axis=0) - np.log(len(SIZES))
+    a = best[1]
+    gain = float(2 * a @ b[:, 0] - a @ G @ a)
+    return Finding(h, float(logs[0]), a, best[2], gain, logs[1:], source, float(np.sqrt(max(a @ size @ a, 0))))
+
+
+def by_law(findings: list[Finding]) -> dict[str, tuple[float, np.ndarray, list[Finding]]]:
+    """Law -> its evidence (mean over what was tried), the same on nulls, and its findings, best first."""
+    laws: dict[str, list[Finding]] = {}
+    for f in findings:
+        laws.setdefault(f.hypothesis.term, []).append(f)
+    result = {}
+    for term, mine in laws.items():
+        logs = logsumexp([f.log_evidence for f in mine]) - np.log(len(mine))
+        nulls = logsumexp([f.nulls for f in mine], axis=0) - np.log(len(mine))
+        result[term] = float(logs), nulls, sorted(mine, key=lambda f: -f.log_evidence)
+    return result

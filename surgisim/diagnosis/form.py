@@ -1,0 +1,76 @@
+"""Where, when and in what courses laws are tried."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.hypothesis import Hypothesis
+
+KNOT = 0.18
+"""Time between the knots of a free time course [s]."""
+APART = 0.0075
+"""Distance between places that are tried [m], for a body of 36 mm; it follows the body's size."""
+
+
+@dataclass(frozen=True)
+class Block:
+    columns: np.ndarray
+    """Displacement of the points by one unit of each [m], (C, K, T, 3)."""
+    hypotheses: list[Hypothesis]
+
+
+def knots(clip: Clip) -> np.ndarray:
+    """[s], from the first fitted frame to the last."""
+    last = (clip.until - 1) / clip.fps
+    return np.linspace(0, last, max(4, round(last / KNOT)))
+
+
+def hats(clip: Clip) -> np.ndarray:
+    """Piecewise linear courses, one a knot, (B, T)."""
+    at, time = knots(clip), clip.time[: clip.until]
+    return np.stack([np.interp(time, at, e) for e in np.eye(len(at))])
+
+
+def places(clip: Clip, apart: float | None = None, depth: float = 0.15) -> np.ndarray:
+    """Centres that are tried [m], (Q, 3): a lattice over the observed side, a share of the depth below it."""
+    apart = apart or APART * scale(clip)
+    axes = plane(clip)
+    flat = clip.rest @ axes.T
+    low, high = flat.min(0), flat.max(0)
+    count = np.maximum(1, np.round((high - low) / apart)).astype(int)
+    grid = [a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in zip(low, high, count, strict=True)]
+    wanted = np.stack(np.meshgrid(*grid), -1).reshape(-1, 2)
+    away = np.linalg.norm(flat[None] - wanted[:, None], axis=-1)
+    wanted = wanted[away.min(1) < 1.2 * apart]
+    free = clip.body.rest[~clip.body.held].astype(float)
+    across, height = free @ axes.T, free @ clip.normal
+    found = []
+    for spot in wanted:
+        near = np.linalg.norm(across - spot, axis=1) < 0.8 * clip.body.spacing
+        if near.any():
+            top, bottom = height[near].max(), height[near].min()
+            found.append(spot @ axes + (top - depth * (top - bottom)) * clip.normal)
+    return np.array(found).reshape(-1, 3)
+
+
+def scale(clip: Clip) -> float:
+    """Size of the body over that for which the lengths here were chosen."""
+    return float(np.cbrt(clip.recording.mesh.volume)) / 0.036
+
+
+def plane(clip: Clip) -> np.ndarray:
+    """Two directions along the observed side, (2, 3)."""
+    u = np.cross(clip.normal, [0.0, 0.0, 1.0] if abs(clip.normal[2]) < 0.9 else [0.0, 1.0, 0.0])
+    u = u / np.linalg.norm(u)
+    return np.stack([u, np.cross(clip.normal, u)])
+
+
+def spread(course: np.ndarray) -> np.ndarray:
+    """A course over knots, (B,), for every direction, (3 B, 3)."""
+    return np.kron(np.eye(3), course[:, None])
+
+
+def moments(clip: Clip, count: int) -> np.ndarray:
+    last = (clip.until - 1) / clip.fps
+    return np.linspace(0.0, 0.92 * last, count)

@@ -1,0 +1,223 @@
+"""From a hypothesis and its amplitude to laws the engine runs."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from surgisim.artifacts.motion import Motion
+from surgisim.diagnosis.base import SAFETY, Base, carried
+from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.hypothesis import RISE, Hypothesis
+from surgisim.diagnosis.memo import Memo
+from surgisim.mpm.setup import Prepared, Values
+from surgisim.mpm.simulator import Run
+from surgisim.physics.catalogue import choose
+from surgisim.physics.place import Place
+
+NEVER = 59.0
+"""An end after every clip [s]."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """What is added to the base."""
+
+    values: Values
+    places: dict[str, Place]
+    motion: Motion | None = None
+    """Where a grip does not carry its tissue along as recorded."""
+    begins: float = 0.0
+    """A law without an onset of its own is switched on here [s]."""
+
+
+def law_of(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> Law:
+    """The law of a hypothesis, as strong as its amplitudes, (H,), say."""
+    a, term = float(amplitude[0]), h.term
+    here = {} if h.place is None else {term: h.place}
+    end = NEVER if h.end is None else h.end - RISE / 2
+    if term == "hidden_contact":
+        return Law({term: _push(amplitude, h.onset + RISE / 2, end)}, here)
+    if term == "added_mass":
+        push = _push(a * h.about["down"], h.onset + RISE / 2, NEVER)
+        return Law({term: {"mass": abs(a) / 9.81}, "hidden_contact": push}, {**here, "hidden_contact": h.place})
+    if term == "tether":
+        yaw, pitch = angles(h.about["down"])
+        own = {"slack": h.about["slack"], "length": h.about["length"], "yaw": yaw, "pitch": pitch}
+        return Law({term: {"stiffness": a, **own}}, here)
+    if term == "gravity":
+        return Law({term: dict(zip("xyz", map(float, amplitude), strict=True))}, {}, begins=h.onset + RISE / 2)
+    if term == "respiration":
+        return Law({term: _breath(amplitude.reshape(4, 3), h.about["rate"])}, {})
+    if term == "tool_slip":
+        return Law({}, {}, _slipped(clip, h, a))
+    if term in ("stiff_inclusion", "base_layer"):
+        return Law({"stiff_inclusion": {"s": float(np.clip(math.exp(a), 0.06, 40.0))}}, {"stiff_inclusion": h.place})
+    if term == "stiffening":
+        return Law({term: {"k": a}}, {})
+    if term == "fibre":
+        yaw, pitch = angles(h.about["axis"])
+        return Law({term: {"k1": a, "k2": h.about["k2"], "yaw": yaw, "pitch": pitch}}, {})
+    if term == "pretension":
+        return Law({term: _tension(amplitude, h.about["plane"])}, {})
+    if term == "relaxation":
+        return Law({term: {"G": a, "tau": h.about["tau"]}}, {})
+    if term == "plastic_set":
+        return Law({term: {"yield_strain": h.about["yield_strain"], "share": min(a, 1.0)}}, {})
+    if term == "damage":
+        return Law({term: {"onset": h.about["onset"], "rate": a}}, {})
+    if term == "sliding_base":
+        yaw, pitch = angles(clip.normal)
+        own = {"share": 1.0, "stiffness": h.about["stiffness"], "yaw": yaw, "pitch": pitch}
+        return Law({term: {**own, "cap": h.about["cap"] / max(a, 1e-3)}}, {})
+    yaw, pitch = angles(h.about["axis"])
+    period, slowness = h.about["period"], h.about["period"] / h.about["wavelength"]
+    # Whole periods earlier, so that every part of the body is in its rhythm when it sets in.
+    onset = -h.about["phase"] / (2 * np.pi) * period - 4 * period
+    own = {"onset": onset, "period": period, "duty": 0.5, "slowness": slowness, "yaw": yaw, "pitch": pitch}
+    begins = h.onset + 0.15 if h.onset else 0.0
+    return Law({"active_contraction": {"tension": a, **own}}, {}, begins=begins)
+
+
+def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = None) -> np.ndarray:
+    """Displacement of the points with the law [m], (K, frames, 3), by the engine. Raises Breakdown."""
+    frames = frames or clip.frames
+    values = {**base.values, **law.values}
+    motion = clip.motion if law.motion is None else law.motion
+
+    def make() -> dict[str, np.ndarray]:
+        prepared = clip.prepared(tuple(values), motion=motion)
+        theta = prepared.theta(values, law.places)
+        per_frame = steps(clip, base, prepared, theta)
+        drive = prepared.drive(motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames, places=law.places)
+        first = int(law.begins * clip.fps)
+        begin = None if first == 0 else base.run.state(first)[:2]
+        run = prepared.simulator.run(theta, drive, begin=begin, first=first, last=frames - 1)
+        seen = carried(prepared.simulator.carry(clip.rest), Run(run.u, run.v, run.q))
+        return {"seen": np.concatenate([base.simulated[:, :first], seen], 1).astype(np.float32)}
+
+    moved = None if law.motion is None else np.round(law.motion.position, 9).tolist()
+    where = {n: [list(p.center), p.extent, p.normal] for n, p in law.places.items()}
+    return memo(["law", base.x.tolist(), values, _plain(where), moved, law.begins, frames], make)["seen"].astype(float)
+
+
+def steps(clip: Clip, base: Base, prepared: Prepared, theta: np.ndarray) -> int:
+    """Stable steps a frame with the law."""
+    return max(prepared.per_frame_of(prepared.stiffest(theta), clip.fps, SAFETY), base.drive.per_frame)
+
+
+def angles(direction: np.ndarray) -> tuple[float, float]:
+    """Yaw and pitch [rad] that point along a direction, (3,)."""
+    x, y, z = np.asarray(direction, float) / max(np.linalg.norm(direction), 1e-30)
+    return math.atan2(x, z), math.asin(min(max(y, -1.0), 1.0))
+
+
+def _push(force: np.ndarray, onset: float, end: float) -> dict[str, float]:
+    yaw, pitch = angles(force)
+    return {"force": float(np.linalg.norm(force)), "yaw": yaw, "pitch": pitch, "onset": float(onset), "end": float(end)}
+
+
+def _breath(parts: np.ndarray, rate: float) -> dict[str, float]:
+    """From sine and cosine of two harmonics along three axes, (4, 3), to one direction."""
+    scaled = parts * np.array([1.0, 1.0, 0.5, 0.5])[:, None]
+    left, size, right = np.linalg.svd(scaled, full_matrices=False)
+    s, c, s2, c2 = left[:, 0] * size[0]
+    first, second = math.hypot(s, c), math.hypot(s2, c2)
+    yaw, pitch = angles(right[0])
+    return {
+        "amplitude": max(first, 1e-9), "period": 1 / rate, "phase": math.atan2(c, s),
+        "second": min(second / max(first, 1e-9), 1.0), "second_phase": math.atan2(c2, s2), "yaw": yaw, "pitch": pitch,
+    }  # fmt: skip
+
+
+def _tension(amplitude: np.ndarray, plane: np.ndarray) -> dict[str, float]:
+    turns = np.arange(3) * np.pi / 3
+    axes = np.stack([np.cos(turns), np.sin(turns)], 1)
+    values, vectors = np.linalg.eigh(np.einsum("h,hi,hj->ij", amplitude, axes, axes))
+    yaw, pitch = angles(vectors[:, 1] @ plane)
+    return {"along": max(float(values[1]), 1e-6), "across": max(float(values[0]), 0.0), "yaw": yaw, "pitch": pitch}
+
+
+def lag(h: Hypothesis, clip: Clip) -> np.ndarray:
+    """Share of its path by which a slipping grip of amplitude 1 stays behind, (T,)."""
+    motion, j = clip.motion, int(h.about["grip"])
+    path = motion.position[j] - motion.center_rest[j]
+    length, on = np.linalg.norm(path, axis=1), motion.active[j]
+    if h.about["tau"] > 0:
+        late = np.maximum(clip.time - h.onset, 0) / h.about["tau"]
+        return np.where(on, (1 - np.exp(-late)) ** 2, 0.0)
+    start = np.interp(h.onset, clip.time, length)
+    return np.where(on & (clip.time > h.onset), np.maximum(length - start, 0) / np.maximum(length, 1e-9), 0.0)
+
+
+def _slipped(clip: Clip, h: Hypothesis, amplitude: float) -> Motion:
+    motion, j = clip.motion, int(h.about["grip"])
+    position = motion.position.copy()
+    path = position[j] - motion.center_rest[j]
+    position[j] = motion.center_rest[j] + (1 - min(amplitude, 1.0) * lag(h, clip))[:, None] * path
+    return replace(motion, position=position)
+
+
+FORCES = (
+    "hidden_contact",
+    "added_mass",
+    "tether",
+    "gravity",
+    "stiffening",
+    "fibre",
+    "pretension",
+    "relaxation",
+    "active_contraction",
+    "sliding_base",
+)
+
+
+def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Clip, base: Base) -> dict[str, dict]:
+    """Parameters with 90 % intervals and units, as diagnosis.json has them."""
+    law = law_of(h, amplitude, clip)
+    size = max(float(np.linalg.norm(amplitude)), 1e-30)
+    share = min(1.645 * float(np.linalg.norm(spread * amplitude)) / size**2, 0.95)
+    result = {}
+    scaling = {
+        "hidden_contact": "force", "added_mass": "mass", "tether": "stiffness", "respiration": "amplitude",
+        "stiffening": "k", "fibre": "k1", "pretension": "along", "relaxation": "G", "plastic_set": "share",
+        "damage": "rate", "active_contraction": "tension", "sliding_base": "cap",
+    }  # fmt: skip
+    # What pushes, pulls or resists is told only over the tissue's own stiffness.
+    by_stiffness = 1.645 * float(base.spread[0])
+    for name, numbers in law.values.items():
+        if name == "hidden_contact" and h.term == "added_mass":
+            continue
+        params = choose([name])[name].params
+        for key, value in numbers.items():
+            low = high = value
+            if name == "gravity":
+                reach = np.hypot(1.645 * spread["xyz".index(key)], by_stiffness * abs(value))
+                low, high = value - reach, value + reach
+            elif scaling.get(h.term) == key:
+                wide = np.hypot(np.log1p(share), by_stiffness if h.term in FORCES else 0.0)
+                low, high = value * np.exp(-wide), value * np.exp(wide)
+            elif key == "s":
+                low, high = value ** (1 - share), value ** (1 + share)
+            result[key] = {
+                "value": float(value),
+                "low": float(min(low, high)),
+                "high": float(max(low, high)),
+                "unit": params[key].unit,
+            }
+    if h.term == "tool_slip":
+        a = float(amplitude[0])
+        result["slip"] = {"value": a, "low": a * (1 - share), "high": a * (1 + share), "unit": "1"}
+        result["tau"] = {"value": float(h.about["tau"]), "low": 0.0, "high": 1.0, "unit": "s"}
+    return result
+
+
+def _plain(value):
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    return None if value is None else float(value)
+
+
+__all__ = ["Law", "angles", "described", "lag", "law_of", "respond"]

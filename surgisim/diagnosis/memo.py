@@ -1,0 +1,36 @@
+"""Finished runs, kept in a folder, so that an interrupted diagnosis goes on where it stopped."""
+
+import hashlib
+import io
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from surgisim.artifacts.base import save_bytes
+
+
+@dataclass(frozen=True)
+class Memo:
+    folder: Path | None
+    """None keeps nothing."""
+    about: str
+    """What all entries depend on: digests of recording, settings and code."""
+
+    def __call__(self, what: Any, make: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+        """The arrays made for `what` (JSON-able), from the folder if they are there."""
+        if self.folder is None:
+            return make()
+        key = hashlib.sha256(json.dumps([self.about, what], sort_keys=True).encode()).hexdigest()[:20]
+        path = self.folder / f"{key}.npz"
+        if path.is_file():
+            with np.load(path, allow_pickle=False) as archive:
+                return dict(archive)
+        made = make()
+        stream = io.BytesIO()
+        np.savez(stream, **made)
+        save_bytes({path: stream.getvalue()})
+        return made

@@ -1,0 +1,43 @@
+"""Least squares with noise that is white but for a few directions: nuisances, and what the simulator gets wrong.
+
+With whitened columns U scaled to their prior standard deviations, the covariance is 1 + U U^T, and (Woodbury)
+
+    <a, b> = a^T (1 + U U^T)^-1 b = a^T b - (U^T a)^T (1 + U^T U)^-1 (U^T b).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+
+@dataclass(frozen=True)
+class Metric:
+    columns: np.ndarray
+    """U, (N, M) float32."""
+    factor: tuple
+
+    def seen_through(self, vectors: np.ndarray) -> np.ndarray:
+        """U^T of vectors (N,) or (N, C)."""
+        return (self.columns.T @ vectors.astype(np.float32)).astype(float)
+
+    def gram(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """<a, b> of columns (N, C) and (N, D)."""
+        plain = (a.T.astype(np.float32) @ b.astype(np.float32)).astype(float)
+        return plain - self.seen_through(a).T @ cho_solve(self.factor, self.seen_through(b))
+
+    def explained(self, vector: np.ndarray) -> np.ndarray:
+        """The part of a vector (N,) that the directions take: nuisances at their most likely values."""
+        return self.columns @ cho_solve(self.factor, self.seen_through(vector)).astype(np.float32)
+
+    def draw(self, rng: np.random.Generator, count: int, project) -> np.ndarray:
+        """Residuals of nothing but noise and nuisance, (N, count); `project` takes out each point's constant."""
+        white = project(rng.standard_normal((len(self.columns), count)).astype(np.float32))
+        return white + self.columns @ rng.standard_normal((self.columns.shape[1], count)).astype(np.float32)
+
+
+def metric(columns: np.ndarray) -> Metric:
+    """columns: whitened and scaled to one prior standard deviation, (N, M)."""
+    U = np.ascontiguousarray(columns if columns.shape[1] else np.zeros((len(columns), 1)), np.float32)
+    normal = (U.T @ U).astype(float)
+    return Metric(U, cho_factor(np.eye(len(normal)) + normal))

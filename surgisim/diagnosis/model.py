@@ -1,0 +1,58 @@
+"""The named law as numbers that a simulation can use."""
+
+import numpy as np
+
+from surgisim.artifacts.physics import Physics
+from surgisim.diagnosis.laws import law_of, steps
+from surgisim.physics.catalogue import choose
+
+
+def base_numbers(base) -> dict:
+    E, nu, lag = float(np.exp(base.x[0])), float(base.x[1]), float(np.exp(base.x[2]))
+    s = 1.645 * base.spread
+    return {
+        "E": {"value": E, "low": E * float(np.exp(-s[0])), "high": E * float(np.exp(s[0])), "unit": "Pa"},
+        "nu": {"value": nu, "low": nu - float(s[1]), "high": nu + float(s[1]), "unit": "1"},
+        "eta": {
+            "value": E * lag,
+            "low": E * lag * float(np.exp(-s[2])),
+            "high": E * lag * float(np.exp(s[2])),
+            "unit": "Pa s",
+        },
+    }
+
+
+def physics(case, refits) -> Physics:
+    """The base's laws, and the named one, with the grid and the step they were fitted on."""
+    clip, base = case.clip, case.base
+    step = base.drive.step
+    values, places, known = dict(base.values), {}, base_numbers(base)
+    if refits:
+        law = law_of(refits[0].finding.hypothesis, refits[0].amplitude, clip)
+        values |= law.values
+        if law.values:
+            prepared = clip.prepared(tuple(values))
+            step = 1 / clip.fps / steps(clip, base, prepared, prepared.theta(values, law.places))
+        h = refits[0].finding.hypothesis
+        if h.term == "tool_slip":
+            values["tool_slip"] = {"slip": min(float(refits[0].amplitude[0]), 1.0), "onset": float(h.onset)}
+        places = {
+            n: {
+                "center": [float(c) for c in p.center],
+                "extent": float(p.extent),
+                "normal": None if p.normal is None else [float(c) for c in p.normal],
+            }
+            for n, p in law.places.items()
+        }
+    terms = {
+        name: {
+            key: {"value": float(value), "unit": term.params[key].unit}
+            | {k: known[key][k] for k in ("low", "high") if name in base.values and key in known}
+            for key, value in values[name].items()
+        }
+        for name, term in choose(values).items()
+    }
+    return Physics(
+        terms=terms, density=float(clip.density), gravity=[0.0, 0.0, 0.0],
+        grid={"spacing": float(clip.body.spacing), "step": float(step)}, places=places,
+    )  # fmt: skip

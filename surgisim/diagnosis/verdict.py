@@ -1,0 +1,241 @@
+"""From fits to a verdict: probabilities, intervals, held-out errors, and what is said in words."""
+
+import numpy as np
+from scipy.special import expit
+
+from surgisim.artifacts.diagnosis import Diagnosis
+from surgisim.artifacts.mismatch import Mismatch
+from surgisim.artifacts.physics import Physics
+from surgisim.diagnosis import calibration, words
+from surgisim.diagnosis.clip import PHASES
+from surgisim.diagnosis.errors import errors, residual, rms
+from surgisim.diagnosis.experiment import separating
+from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.laws import described, law_of, respond
+from surgisim.diagnosis.locate import cause, of_places, symptom
+from surgisim.diagnosis.model import base_numbers, physics
+from surgisim.mpm.simulator import Breakdown
+
+RUNNERS = 4
+
+
+def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis, Physics, Mismatch]:
+    """Everything a diagnosis leaves behind. refits: best first; second: another effect and its log evidence."""
+    clip, base = case.clip, case.base
+    rng = np.random.default_rng([case.settings.seed, 1])
+    chances = probabilities(laws, refits, detected)
+    total = max(explainable(bend), max([r.gain for r in refits], default=0.0), 1e-9)
+    after = base.simulated.copy()
+    effects, explained = [], 0.0
+    verdict, alike = "nothing detectable", []
+    if detected:
+        first = refits[0]
+        explained = first.gain / total
+        accepted = [first]
+        if second is not None and second[0].gain > calibration.SECOND * total:
+            accepted.append(second[0])
+            explained = min((first.gain + second[0].gain) / total, 1.0)
+        alike = [r for r in refits[1:] if _cos(case, first, r) > calibration.ALIKE and chances[r.term] > 0.1]
+        verdict = "named"
+        if explained < calibration.EXPLAINED:
+            verdict = "unexplained"
+        elif alike and chances[first.term] < calibration.SURE:
+            verdict = "equivalence class"
+        for r in accepted:
+            after = after + r.response
+        effects = [_effect(case, r, chances, laws, refits, n) for n, r in enumerate(accepted)]
+        if verdict == "unexplained":
+            for effect in effects:
+                effect["probability"] = min(effect["probability"], explained / 2)
+    placebo = _placebo(case, refits, laws, rng) if detected else base.simulated
+    fit, held_out = errors(case, after, placebo)
+    z, reach = symptom(clip, case.noise, residual(case, base.simulated, False), rng)
+    freed = case.z - case.space.explained(case.z)
+    cleared = case.nulls - case.space.explained(case.nulls)
+    heat, when = cause(base, case.whiten, freed, cleared)
+    heat = heat / max(heat.max(), 1e-30)
+    if effects and refits[0].finding.hypothesis.place is not None and refits[0].finding.hypothesis.place.normal is None:
+        heat = of_places(clip, laws[refits[0].term][2], base.prepared.simulator.rest)
+    if verdict in ("named", "equivalence class") and case.settings.experiment and len(refits) > 1:
+        pair = [law_of(r.finding.hypothesis, r.amplitude, clip) for r in refits[:2]]
+        effects[0]["separating_experiment"] = separating(
+            clip, base, *pair, case.memo, (refits[0].term, refits[1].term), rng
+        )
+    said = _words(case, verdict, refits, effects, explained, laws, z)
+    above = detectable(case, laws)
+    diagnosis = Diagnosis(
+        recording=clip.recording.name,
+        verdict=verdict,
+        effects=effects,
+        ranking=_ranking(case, laws, ranked, refits, chances),
+        detectable_above={"value": above[0], "unit": "mm", "laws": above[1]},
+        missing_phases=missing(clip),
+        fit=fit,
+        held_out=held_out,
+        unexplained_fraction=float(np.clip(1 - explained, 0, 1)) if detected else 0.0,
+        words=said,
+        base=base_numbers(base),
+        noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(case.noise).items()}
+        | {"sigma": case.noise.sigma, "unit": "m"},
+        global_test={
+            "log_evidence": float(laws[ranked[0]][0]),
+            "nulls": np.round(np.max([n for _, n, _ in laws.values()], 0), 3).tolist(),
+            "explainable": float(explainable(bend)),
+        },
+    )
+    mismatch = Mismatch(
+        points=clip.rest,
+        residual_before=residual(case, base.simulated),
+        residual_after=residual(case, after if verdict != "unexplained" else base.simulated),
+        z=z,
+        significant=reach,
+        particles=base.prepared.simulator.rest,
+        cause=heat,
+        cause_time=np.concatenate([when, np.zeros(clip.frames - clip.until)]),
+        phase=clip.phases(),
+    )
+    return diagnosis, physics(case, refits if verdict in ("named", "equivalence class") else []), mismatch
+
+
+def explainable(bend) -> float:
+    """chi square that a smooth field gains beyond what it gains where nothing is hidden."""
+    return max(bend.gain - calibration.SLACK, 0.0)
+
+
+def probabilities(laws: dict, refits: list, detected: bool) -> dict[str, float]:
+    """Law -> probability; what is missing to 1 is nothing, or a law that nobody thought of."""
+    if not detected:
+        top = max(laws.values(), key=lambda entry: entry[0])[0]
+        logs = {term: entry[0] / calibration.TEMPERATURE for term, entry in laws.items()}
+        none = max(0.0, calibration.THRESHOLD - top) / 4
+    else:
+        logs = {term: entry[0] for term, entry in laws.items()}
+        logs |= {r.term: r.log_evidence for r in refits}
+        best = max(r.gain for r in refits)
+        heat = calibration.TEMPERATURE + calibration.MISFIT * max(best, 0.0)
+        logs = {term: value / heat for term, value in logs.items()}
+        none = calibration.THRESHOLD / heat
+    scale = max(*logs.values(), none)
+    weight = {term: np.exp(value - scale) for term, value in logs.items()}
+    whole = sum(weight.values()) + np.exp(none - scale)
+    return {term: float(w / whole) for term, w in weight.items()}
+
+
+def detectable(case, laws: dict) -> tuple[float, dict[str, float]]:
+    """RMS sizes [mm] at which the best hypothesis of each law would reach the threshold, and their median."""
+    result = {}
+    for term, (_, _, findings) in laws.items():
+        f = findings[0]
+        if f.size > 0 and f.gain > 0:
+            result[term] = float(1e3 * f.size * np.sqrt(2 * (calibration.THRESHOLD + 4) / f.gain))
+    return (float(np.median(list(result.values()))) if result else float("nan")), result
+
+
+def missing(clip) -> list[str]:
+    """Phases that the fitted frames lack, without which some laws cannot be told."""
+    present = {PHASES[k] for k in np.unique(clip.phases()[: clip.until])}
+    return [name for name in PHASES if name not in present]
+
+
+def _effect(case, r, chances, laws, refits, number) -> dict:
+    h: Hypothesis = r.finding.hypothesis
+    # Of a blob the radius at which it is down to a half; a grip's own radius.
+    reach = 1.0 if r.term == "tool_slip" else np.sqrt(2 * np.log(2))
+    runners = [
+        {"term": t, "probability": chances[t]} for t in sorted(chances, key=lambda t: -chances[t]) if t != r.term
+    ]
+    local = h.place is not None and h.place.normal is None
+    place: dict | str = "everywhere"
+    if local:
+        place = {"center": [float(c) for c in h.place.center], "extent": float(reach * h.place.extent), "unit": "m"}
+    heat = calibration.TEMPERATURE + calibration.MISFIT * max(r.gain, 0.0)
+    alone = float(expit((r.log_evidence - calibration.THRESHOLD) / heat))
+    return {
+        "term": r.term,
+        "probability": chances[r.term] if number == 0 else alone,
+        "place": place,
+        "time": {"onset": None if h.onset is None else float(h.onset), "end": None if h.end is None else float(h.end)},
+        "parameters": described(h, r.amplitude, r.finding.spread, case.clip, case.base),
+        "runners_up": runners[:RUNNERS],
+        "separating_experiment": "",
+        "log_evidence": float(r.log_evidence),
+        "size": {"value": float(1e3 * r.finding.size), "unit": "mm"},
+    }
+
+
+def _cos(case, a, b) -> float:
+    until = case.clip.until
+    white = np.stack([case.whiten(r.response[:, :until]) for r in (a, b)], 1)
+    G = case.space.gram(white, white)
+    return float(abs(G[0, 1]) / np.sqrt(max(G[0, 0] * G[1, 1], 1e-30)))
+
+
+def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
+    run = {r.term: r for r in refits}
+    order = sorted(ranked, key=lambda t: -chances[t])
+    result = []
+    for term in order:
+        f = laws[term][2][0]
+        place = f.hypothesis.place
+        r = run.get(term)
+        held = None
+        if r is not None and case.clip.frames > case.clip.until:
+            held = rms(case, case.base.simulated + r.response)[1]
+        result.append(
+            {
+                "term": term,
+                "place": "everywhere"
+                if place is None
+                else {"center": [float(c) for c in place.center], "extent": float(place.extent), "unit": "m"},
+                "log_evidence": float(laws[term][0] if r is None else r.log_evidence),
+                "probability": chances[term],
+                "gain": float(f.gain if r is None else r.gain),
+                "cos": None if r is None else _cos(case, refits[0], r),
+                "held_out": held,
+                "onset": f.hypothesis.onset,
+                "refitted": r is not None,
+            }
+        )
+    return result
+
+
+def _placebo(case, refits, laws, rng) -> np.ndarray:
+    """The same law at a wrong place, or a wrong law, with its strength fitted all the same."""
+    first = refits[0].finding.hypothesis
+    mine = laws[refits[0].term][2]
+    far = (
+        [
+            f
+            for f in mine
+            if f.hypothesis.place is not None
+            and np.linalg.norm(np.subtract(f.hypothesis.place.center, first.place.center)) > 0.012
+        ]
+        if first.place is not None
+        else []
+    )
+    others = far or [
+        laws[t][2][0]
+        for t in sorted(laws)
+        if t not in {r.term for r in refits[:2]} and laws[t][2][0].hypothesis.mix.shape[1] <= 3
+    ]
+    if not others:
+        return case.base.simulated
+    chosen = others[int(rng.integers(len(others)))]
+    try:
+        return respond(case.clip, case.base, law_of(chosen.hypothesis, chosen.amplitude, case.clip), case.memo)
+    except Breakdown:
+        return case.base.simulated
+
+
+def _words(case, verdict, refits, effects, explained, laws, z) -> str:
+    if verdict == "nothing detectable":
+        return words.nothing(1e-3 * detectable(case, laws)[0])
+    if verdict == "unexplained":
+        k, t = np.unravel_index(np.argmax(z[:, : case.clip.until]), (len(z), case.clip.until))
+        when = f"at {t / case.clip.fps:.2g} s ({PHASES[case.clip.phases()[t]]})"
+        return words.unexplained(refits[0].term, 1 - explained, when, case.clip.rest[k].tolist())
+    first = refits[0]
+    said = words.sentence(first.finding.hypothesis, effects[0]["parameters"], explained, first.finding.size)
+    if verdict == "equivalence class":
+        said += f" {effects[0]['runners_up'][0]['term']} would look nearly the same."
+    return said

@@ -1,0 +1,62 @@
+"""Two plain sentences for a verdict."""
+
+from surgisim.diagnosis.hypothesis import Hypothesis
+
+SAYS = {
+    "hidden_contact": ("something unseen pushes the tissue {where} from {onset} to {end}", "a push there ({amount})"),
+    "added_mass": ("the tissue sags {where} from {onset} on, as under a load", "a weight there ({amount})"),
+    "tether": ("the tissue {where} is held back once it has moved, as by an adhesion", "a band there ({amount})"),
+    "gravity": ("all tissue shifts one way from {onset} on, as on a tilted table", "that change of weight ({amount})"),
+    "respiration": ("the base moves to and fro, touched or not, as with breathing", "a moving base ({amount})"),
+    "tool_slip": ("the tissue follows the instrument less and less from {onset} on", "a grip that slips ({amount})"),
+    "stiff_inclusion": ("the tissue {where} strains {less} than around it", "a lump of another stiffness ({amount})"),
+    "base_layer": ("the deep tissue strains {less} than what lies above it", "a layer of another stiffness ({amount})"),
+    "stiffening": ("the tissue resists the more the further it is strained", "strain stiffening ({amount})"),
+    "fibre": ("the tissue resists being stretched along one direction", "strands in that direction ({amount})"),
+    "pretension": ("the tissue resists bending and lifting as something taut does", "a tension at rest ({amount})"),
+    "relaxation": ("tissue gives way while held and creeps back after the release", "stiffness that fades ({amount})"),
+    "plastic_set": ("the tissue does not come back all the way after the release", "a lasting set ({amount})"),
+    "damage": ("the tissue is softer after it has been strained than before", "damage ({amount})"),
+    "active_contraction": ("the tissue contracts by itself, in waves", "muscle that pulls ({amount})"),
+    "sliding_base": ("the tissue glides along its base where it is pulled hard", "a base with friction ({amount})"),
+}  # fmt: skip
+
+
+def sentence(h: Hypothesis, parameters: dict[str, dict], gained: float, size: float) -> str:
+    """What is seen, and what naming it gains."""
+    seen, law = SAYS[h.term]
+    where = "" if h.place is None else f"near ({', '.join(f'{1e3 * c:.0f}' for c in h.place.center)}) mm"
+    first = next(iter(parameters.items()), None)
+    amount = (
+        ""
+        if first is None
+        else f"{first[0]} = {first[1]['value']:.3g} {first[1]['unit']}, {first[1]['low']:.3g} to {first[1]['high']:.3g}"
+    )
+    softer = "s" in parameters and parameters["s"]["value"] < 1
+    said = seen.format(
+        where=where, onset=_moment(h.onset), end=_moment(h.end), less="more" if softer else "less",
+    ).replace("  ", " ")  # fmt: skip
+    return (
+        f"Beside its simulation the recording shows that {said} ({1e3 * size:.2g} mm RMS). "
+        f"Adding {law.format(amount=amount)} removes {100 * gained:.0f} % of the misfit that physics can explain."
+    )
+
+
+def nothing(above: float) -> str:
+    return (
+        "Simulation and recording differ by no more than noise, camera and discretisation explain. "
+        f"Effects above {1e3 * above:.2g} mm RMS would mostly have been seen."
+    )
+
+
+def unexplained(best: str, left: float, when: str, where: list[float]) -> str:
+    at = ", ".join(f"{1e3 * c:.0f}" for c in where)
+    return (
+        f"The recording departs from its simulation, most of all near ({at}) mm {when}, and no law tried explains it: "
+        f"{best} comes nearest and leaves {100 * left:.0f} % of it. "
+        "What is missing is not in the catalogue, or more than one thing."
+    )
+
+
+def _moment(seconds: float | None) -> str:
+    return "the end" if seconds is None else f"{seconds:.2g} s"

@@ -1,0 +1,1 @@
+"""Was the diagnosis right? What was sealed is opened here, and nowhere else, and held against what was said."""

@@ -1,0 +1,1 @@
+"""Real recordings of which their makers know what a simulation would lack: one file each."""

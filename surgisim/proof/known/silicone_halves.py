@@ -1,0 +1,40 @@
+"""A bar cast of two silicones, one half twice as stiff as the other, hangs out from a clamp."""
+
+from pathlib import Path
+
+import numpy as np
+
+from surgisim.proof.known.catalogue import Answer, Found, Known, named
+
+LUMPS = ("stiff_inclusion", "base_layer")
+
+
+def convert(folder: Path):
+    from surgisim.proof.rigs.hanging_beam import hanging
+
+    with np.load(folder / "lidar_depth_targets_m_768x1024.npz") as pictures:
+        depth = pictures["h_em_c"].astype(float)
+    return hanging(depth, folder / "cantilever_f1494_v749.tet")
+
+
+def ask(folder: Path, found: Found) -> list[Answer]:
+    answers = [named(found.verdict, LUMPS, "tissue that is stiffer or softer somewhere")]
+    lump = next((e for e in found.verdict.effects if e.term in LUMPS), None)
+    if lump is None or not answers[0].met:
+        return answers
+    asked = "the half at the clamp (x > 0) is the softer"
+    factor = lump.parameters.get("s", {}).get("value")
+    if lump.center is None or factor is None:
+        return [*answers, Answer("which half is soft", asked, "no place, or no factor, is given", False)]
+    softer = factor < 1
+    got = f"{'softer' if softer else 'stiffer'} by {factor:.2g} at x = {1e3 * lump.center[0]:.0f} mm"
+    return [*answers, Answer("which half is soft", asked, got, softer == (lump.center[0] > 0))]
+
+
+KNOWN = Known(
+    title="A bar of two silicones, its two halves concealed",
+    data="diffcal_silicone",
+    concealed="The base is one silicone. The bar is Ecoflex-50 at the clamp and MoldStar-15, twice as stiff, beyond.",
+    convert=convert,
+    ask=ask,
+)

@@ -1,0 +1,89 @@
+"""A clip that went through the graph, as a recording: what the diagnosis of a video looks at."""
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+from skimage.measure import marching_cubes
+
+from surgisim.artifacts.body import Body
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.frames import AFTER, Frames
+from surgisim.artifacts.material import Material
+from surgisim.artifacts.motion import Motion
+from surgisim.artifacts.physics import Physics
+from surgisim.artifacts.tracks import Tracks
+from surgisim.problem import Problem
+from surgisim.recordings.mesh import Mesh, closed
+from surgisim.recordings.recording import Recording
+
+FINE = 0.5
+"""Width of a voxel of the body's surface over the body's spacing."""
+FITTED = 0.7
+"""Share of the frames that are fitted where none were held out after them."""
+MARGIN = 4
+"""Empty voxels around the body."""
+
+
+def recording_of(
+    name: str, body: Body, material: Material, physics: Physics, tracks: Tracks, motion: Motion, frames: Frames,
+    camera: Camera,
+) -> Recording:  # fmt: skip
+    """Tracked points, grips, body and held boundary of a clip, in the camera's frame.
+
+    A point's noise is the RMS of what the tracker says of it across and along the view. Frames held out after the
+    fitted ones are held out here too; those between are fitted. Raises Problem where no point was seen in frame 0.
+    """
+    first = tracks.xyz[:, 0]
+    kept = np.isfinite(first).all(1) & tracks.visible[:, 0]
+    if not kept.any():
+        raise Problem(f"clip {name}: no tracked point has a depth in frame 0, so none can be followed on the body.")
+    points = tracks.xyz[kept]
+    visible = tracks.visible[kept] & np.isfinite(points).all(-1)
+    across, along = np.moveaxis(np.where(visible[..., None], tracks.sigma_xyz[kept], np.nan), -1, 0)
+    sigma = np.sqrt(np.nanmedian((2 * across**2 + along**2) / 3, axis=1))
+    after = np.flatnonzero(frames.split == AFTER)
+    total = len(frames.split)
+    until = int(after[0]) if len(after) else round(FITTED * total)
+    split = {"fit": (0, until), "held_out": (until, total)}
+    return Recording(
+        name=name,
+        fps=camera.fps,
+        mesh=surface(body),
+        boxes=held_boxes(body, material.held),
+        points=np.where(visible[..., None], points, np.nan).astype(np.float32),
+        visible=visible,
+        sigma=sigma,
+        motion=motion,
+        density=physics.density,
+        tier="video",
+        place=points[:, 0].astype(float),
+        split=split,
+    )
+
+
+def surface(body: Body) -> Mesh:
+    """The closed surface on which half of a voxel's worth of tissue lies within a voxel's reach."""
+    width = FINE * body.spacing
+    low = body.rest.min(0).astype(float) - (MARGIN + 0.5) * width
+    at = (body.rest.astype(float) - low) / width
+    shape = np.ceil(at.max(0)).astype(int) + MARGIN
+    edges = [np.arange(n + 1) for n in shape]
+    volume, _ = np.histogramdd(at, edges, weights=body.volume.astype(float))
+    share = gaussian_filter(volume / width**3, 1.0)
+    vertices, faces, _, _ = marching_cubes(share, 0.5)
+    # A voxel's number belongs to its middle.
+    return closed(Mesh(low + (vertices + 0.5) * width, faces.astype(int)), "the clip's body")
+
+
+def held_boxes(body: Body, held: np.ndarray) -> np.ndarray:
+    """Voxels in which most particles are held, joined along z [m], (B, 2, 3)."""
+    width = FINE * body.spacing
+    low = body.rest.min(0).astype(float) - 0.5 * width
+    cell = np.floor((body.rest - low) / width).astype(int)
+    shape = tuple(cell.max(0) + 1)
+    flat = np.ravel_multi_index(cell.T, shape)
+    count = np.bincount(flat, minlength=np.prod(shape))
+    mostly = (np.bincount(flat, held, np.prod(shape)) > 0.5 * np.maximum(count, 1)).reshape(shape)
+    steps = np.diff(np.pad(mostly.astype(int), ((0, 0), (0, 0), (1, 1))), axis=2)
+    begin, end = np.argwhere(steps == 1), np.argwhere(steps == -1)
+    corner = np.stack([begin, np.concatenate([end[:, :2] + 1, end[:, 2:]], 1)], 1)
+    return low + corner * width

@@ -1,0 +1,1 @@
+"""The scoreboard of a run of concealed recordings as one page."""

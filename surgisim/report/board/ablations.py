@@ -1,0 +1,23 @@
+"""What each part of the method, and of the clip, is worth, as one HTML file."""
+
+from typing import Any
+
+from surgisim.report.board.page import told
+from surgisim.report.headline import shown
+from surgisim.report.page import template
+
+WORDS = {
+    "main": "the method",
+    "iid": "residuals taken as independent",
+    "no_offset": "no reference offset of the points",
+    "no_nulls": "no calibration on nulls",
+    "no_model_error": "no error of the simulator itself",
+    "until_load": "fitted until the load ends",
+    "until_hold": "fitted until the hold ends",
+    "shuffled": "another case's paths",
+}
+
+
+def page(found: dict[str, Any]) -> bytes:
+    """UTF-8."""
+    return template("ablations.html.j2").render(**found, told=told, shown=shown, words=WORDS).encode()

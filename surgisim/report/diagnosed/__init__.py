@@ -1,0 +1,1 @@
+"""What physics was left out, on one page that an engineer understands in a minute."""

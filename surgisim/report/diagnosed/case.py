@@ -1,0 +1,80 @@
+"""What the page shows, together."""
+
+import json
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from surgisim.artifacts.base import load
+from surgisim.artifacts.mismatch import Mismatch
+from surgisim.artifacts.verdict import Verdict, read_verdict
+from surgisim.problem import Problem
+from surgisim.recordings.folder import read_recording
+from surgisim.recordings.recording import Recording
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    recording: Recording
+    verdict: Verdict
+    mismatch: Mismatch
+    physics: dict[str, Any]
+    """physics.json as it stands."""
+    experiment: dict[str, Any] = field(default_factory=dict)
+    """"center" and "pull" [m] of the separating experiment, where the diagnosis gives them."""
+
+    @property
+    def time(self) -> np.ndarray:
+        """[s], (T,)"""
+        return np.arange(self.recording.frames) / self.recording.fps
+
+    @property
+    def phase(self) -> np.ndarray:
+        """What goes on in each frame, (T,) words."""
+        return np.array(("rest", "load", "hold", "released"))[self.mismatch.phase]
+
+    @property
+    def split(self) -> np.ndarray:
+        """0 where a frame could be fitted, 2 where it was held out, (T,)."""
+        held = np.zeros(self.recording.frames, int)
+        first, last = (self.recording.split or {}).get("held_out", (0, 0))
+        held[first:last] = 2
+        return held
+
+    @property
+    def up(self) -> np.ndarray:
+        """Against gravity, or from the body's middle to the points that are seen, (3,)."""
+        if self.recording.gravity is not None and np.linalg.norm(self.recording.gravity) > 0:
+            away = -np.array(self.recording.gravity)
+        else:
+            away = self.mismatch.points.mean(0) - self.mismatch.particles.mean(0)
+        return away / max(float(np.linalg.norm(away)), 1e-12)
+
+
+def read(recording: Path, diagnosis: Path, mismatch: Path, physics: Path) -> Diagnosed:
+    """Everything that the page shows. Raises Problem for files that are not of one diagnosis."""
+    clip, verdict, left = read_recording(recording), read_verdict(diagnosis), load(Mismatch, mismatch)
+    if verdict.recording != clip.name or len(left.phase) != clip.frames:
+        raise Problem(
+            f"{diagnosis}: is of recording {verdict.recording} with {len(left.phase)} frames in {mismatch.name}, but "
+            f"{recording} is {clip.name} with {clip.frames}. Pass files of one diagnosis."
+        )
+    told = json.loads(diagnosis.read_text())
+    return Diagnosed(clip, verdict, left, json.loads(physics.read_text()), told.get("experiment") or _pull(verdict))
+
+
+PULL = re.compile(r"near \(([-\d., ]+)\) mm, pull ([\d.]+) mm .*?along \(([-\d., ]+)\)")
+"""How a diagnosis words a pull."""
+
+
+def _pull(verdict: Verdict) -> dict[str, Any]:
+    """Where the first separating experiment takes hold and how it pulls, from its words."""
+    for effect in verdict.effects:
+        found = PULL.search(effect.separating_experiment)
+        if found:
+            center, way = (np.array([float(x) for x in found[k].split(",")]) for k in (1, 3))
+            return {"center": 1e-3 * center, "pull": 1e-3 * float(found[2]) * way}
+    return {}

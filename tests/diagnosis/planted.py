@@ -1,0 +1,57 @@
+"""A small block of tissue whose recording the engine itself makes, with a law planted or none."""
+
+import numpy as np
+
+from surgisim.artifacts.motion import Motion
+from surgisim.diagnosis.base import SAFETY, carried, values_of
+from surgisim.diagnosis.clip import clip_of
+from surgisim.diagnosis.hypothesis import ease
+from surgisim.diagnosis.noise import Noise
+from surgisim.physics.place import Place
+from surgisim.recordings.mesh import Mesh
+from surgisim.recordings.recording import Recording
+
+SIZE, FPS, FRAMES, FIT = np.array([0.036, 0.030, 0.012]), 10.0, 32, 24
+GRID = 0.23
+TRUE = np.array([np.log(2.5e3), 0.44, np.log(4e-3)])
+NOISE = dict(shared=0.3, length=0.006, rigid=0.02, tilt=0.02, keep_shared=0.6, lasting=0.2, keep=0.6, white=0.45)
+
+
+def block() -> Mesh:
+    corner = (np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) - [0.5, 0.5, 0]) * SIZE
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [(a, *pair) for a, b, c, d in sides for pair in ((b, c), (c, d))]
+    return Mesh(corner, np.array(faces))
+
+
+def recording(values=None, places=None, seed=0, sigma=1.5e-4, grips=True) -> Recording:
+    """Pulled up and sideways from frame 4, held, let go at 17; `values` and `places` are what is planted."""
+    rng = np.random.default_rng(seed)
+    side = np.stack(np.meshgrid(np.linspace(-0.016, 0.016, 8), np.linspace(-0.013, 0.013, 6)), -1).reshape(-1, 2)
+    rest = np.concatenate([side, np.full((len(side), 1), SIZE[2])], 1)
+    time = np.arange(FRAMES)
+    path = ease((time - 4) / 5)[:, None] * [0.002, 0.001, 0.004]
+    center = np.array([-0.006, -0.004, SIZE[2]])
+    motion = Motion(
+        center[None], np.array([0.005]), (center + path)[None], ((time >= 4) & (time <= 17))[None], np.ones(1), "given"
+    )
+    held = np.array([[[-0.1, -0.1, -1.0], [0.1, 0.1, 0.0025]]])
+    made = Recording(
+        name="planted", fps=FPS, mesh=block(), boxes=held,
+        points=np.repeat(rest[:, None], FRAMES, 1).astype(np.float32),
+        visible=np.ones((len(rest), FRAMES), bool), sigma=np.full(len(rest), sigma), motion=motion, density=1050.0,
+        gravity=(0.0, 0.0, -9.81), place=rest, split={"fit": (0, FIT), "held_out": (FIT, FRAMES)},
+    )  # fmt: skip
+    clip = clip_of(made, share=GRID)
+    values = {**values_of(TRUE), **(values or {})}
+    prepared = clip.prepared(tuple(values))
+    theta = prepared.theta(values, places or {})
+    per_frame = prepared.per_frame_of(prepared.stiffest(theta), FPS, SAFETY)
+    drive = prepared.drive(motion, values, fps=FPS, per_frame=per_frame, places=places or {})
+    moved = carried(prepared.simulator.carry(rest), prepared.simulator.run(theta, drive))
+    noise = Noise(level=np.full(len(rest), sigma), **NOISE).draw(rest, FRAMES, rng)
+    points = rest[:, None] + moved + noise + 0.5 * sigma * rng.standard_normal((len(rest), 1, 3))
+    return Recording(**{**vars(made), "points": points.astype(np.float32)})
+
+
+BLOB = Place((0.008, 0.006, 0.010), 0.0035)

@@ -1,0 +1,45 @@
+"""Evidence prefers what is there, and charges for having looked in many places."""
+
+import numpy as np
+import pytest
+
+from surgisim.diagnosis.evidence import by_law, weigh
+from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.metric import metric
+
+SPACE = metric(np.zeros((400, 1)))
+
+
+def found(signature, residual, term="here", sign=0):
+    white = signature[:, None]
+    gram, shadow = SPACE.gram(white, white), SPACE.gram(white, residual)
+    return weigh(Hypothesis(term, np.ones((1, 1)), sign), gram, shadow, np.array([[1e-8]]), 0)
+
+
+@pytest.fixture
+def parts():
+    rng = np.random.default_rng(0)
+    return rng, rng.standard_normal(400)
+
+
+def test_a_planted_signature_is_found_and_nulls_are_not(parts):
+    rng, s = parts
+    residuals = np.concatenate([(0.6 * s)[:, None], np.zeros((400, 1))], 1) + rng.standard_normal((400, 2))
+    f = found(s, residuals)
+    assert f.log_evidence > 20 > 1 > f.nulls[0]
+    assert f.amplitude[0] == pytest.approx(0.6, abs=0.2)
+
+
+def test_an_amplitude_of_the_wrong_sign_counts_against_a_law(parts):
+    rng, s = parts
+    residual = (-0.6 * s + rng.standard_normal(400))[:, None]
+    assert found(s, residual).log_evidence > 20
+    assert found(s, residual, sign=1).log_evidence < 1
+
+
+def test_a_law_tried_in_many_places_pays_for_them(parts):
+    rng, s = parts
+    residual = (0.6 * s + rng.standard_normal(400))[:, None]
+    others = [found(rng.standard_normal(400), residual, "anywhere") for _ in range(50)]
+    laws = by_law([found(s, residual), found(s, residual, "anywhere"), *others])
+    assert laws["here"][0] - laws["anywhere"][0] == pytest.approx(np.log(51), abs=0.05)

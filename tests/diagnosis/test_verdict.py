@@ -1,0 +1,59 @@
+"""Plant a law, and the diagnosis names it; plant nothing, and it names nothing."""
+
+import numpy as np
+import pytest
+from planted import GRID, recording
+
+from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis.calibration import THRESHOLD
+from surgisim.diagnosis.diagnose import diagnose
+from surgisim.diagnosis.memo import Memo
+
+SETTINGS = Diagnosing(grid=GRID, nulls=8, experiment=False)
+
+
+def verdict(**planted):
+    return diagnose(recording(**planted), SETTINGS, lambda *_: None, Memo(None, ""))
+
+
+@pytest.fixture(scope="module")
+def tilted():
+    return verdict(values={"gravity": {"x": 8.0, "y": 0.0, "z": 0.0}})
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return verdict()
+
+
+def test_a_change_of_weight_is_named(tilted):
+    found, physics, _ = tilted
+    assert found.verdict == "named"
+    assert found.effects[0]["term"] == "gravity"
+    assert found.effects[0]["probability"] > 0.5
+    x = found.effects[0]["parameters"]["x"]
+    assert x["low"] < 8.0 < x["high"]
+    assert physics.terms["gravity"]["x"]["value"] == pytest.approx(x["value"])
+    assert found.fit["after"] < found.fit["before"]
+    assert found.fit["after"] < found.fit["placebo"]
+
+
+def test_nothing_planted_is_nothing_named(plain):
+    found, physics, _ = plain
+    assert found.verdict == "nothing detectable"
+    assert not found.effects
+    assert set(physics.terms) == {"neo_hookean_ciarlet", "newtonian"}
+    assert found.detectable_above["value"] > 0
+
+
+def test_nulls_stay_below_the_threshold(plain, tilted):
+    assert max(*plain[0].global_test["nulls"], *tilted[0].global_test["nulls"]) < THRESHOLD
+
+
+def test_the_mismatch_covers_every_point_frame_and_particle(tilted):
+    _, _, mismatch = tilted
+    assert mismatch.z.shape == mismatch.residual_before.shape[:2]
+    assert mismatch.cause.shape == (len(mismatch.particles),)
+    assert mismatch.cause.min() >= 0
+    assert mismatch.cause.max() == pytest.approx(1.0)
+    assert np.isfinite(mismatch.residual_after[np.isfinite(mismatch.residual_before)]).all()

@@ -1,0 +1,62 @@
+"""A clip's artifacts as a recording: the same body, the same boundary, the same points."""
+
+import numpy as np
+import pytest
+from slab import pulled, slab
+
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.frames import Frames
+from surgisim.artifacts.material import Material
+from surgisim.artifacts.physics import Physics
+from surgisim.artifacts.tracks import Tracks
+from surgisim.problem import Problem
+from surgisim.recordings.folder import read_recording, write_recording
+from surgisim.recordings.of_clip import recording_of, surface
+
+T = 24
+
+
+def clip(seen=True):
+    body, motion = slab(), pulled(frames=T)
+    rest = body.rest[body.surface].astype(np.float32)
+    k = len(rest)
+    xyz = np.repeat(rest[:, None], T, 1)
+    xyz[3, 5:9] = np.nan
+    tracks = Tracks(
+        np.zeros((k, T, 2), np.float32), np.full((k, T), seen), np.ones((k, T), np.float32), xyz,
+        np.full((k, T, 2), 2e-4, np.float32),
+    )  # fmt: skip
+    material = Material(np.array(["corotated.E"]), np.ones((len(body.rest), 1), np.float32), body.held)
+    physics = Physics(
+        density=1050.0, form="total", gravity=[0.0, 0.0, 0.0], grid={"spacing": body.spacing, "step": 1e-3}, grip=1.0,
+        places={}, terms={},
+    )  # fmt: skip
+    split = np.zeros(T, np.uint8)
+    split[-5:] = 2
+    camera = Camera(64, 48, 80.0, 80.0, 31.5, 23.5, 25.0, T, "known", "given", "slab", [64, 48], [0, 0, 64, 48])
+    frames = Frames(np.zeros((T, 48, 64, 3), np.uint8), split)
+    return body, material, physics, tracks, motion, frames, camera
+
+
+def test_a_clip_survives_the_way_through_a_folder(tmp_path):
+    body, *rest = clip()
+    write_recording(recording_of("slab", body, *rest), tmp_path)
+    back = read_recording(tmp_path)
+    assert back.split == {"fit": (0, T - 5), "held_out": (T - 5, T)}
+    assert not back.visible[3, 5:9].any()
+    assert back.mesh.volume == pytest.approx(float(body.volume.sum()), rel=0.12)
+    filled = back.body(body.spacing)
+    assert filled.held.mean() == pytest.approx(body.held.mean(), abs=0.1)
+
+
+def test_the_surface_encloses_the_body():
+    body = slab()
+    mesh = surface(body)
+    low, high = mesh.vertices.min(0), mesh.vertices.max(0)
+    assert (np.abs(low - body.rest.min(0)) < 0.6 * body.spacing).all()
+    assert (np.abs(high - body.rest.max(0)) < 0.6 * body.spacing).all()
+
+
+def test_a_clip_without_points_is_refused():
+    with pytest.raises(Problem, match="no tracked point"):
+        recording_of("slab", *clip(seen=False))

@@ -1,0 +1,117 @@
+"""Concealed recordings: the order in which answers are fixed, diagnoses made, and truths opened."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from cheap_tree import Tree
+
+ROOT = Path(__file__).parents[2]
+JOB = re.compile(r"^(?:local)?rule (\w+):\n(?:    input: (.*)\n)?(?:    output: (.*)\n)?", re.M)
+
+
+@pytest.fixture
+def jobs(tree):
+    """(rule, inputs, outputs) of every job that a dry run of a target would start."""
+
+    shutil.copy(Path(__file__).with_name("stand_in.py"), tree.root / "stages" / "diagnosis.py")
+
+    def planned(target: str) -> list[tuple[str, list[str], list[str]]]:
+        command = [sys.executable, "-m", "snakemake", "--snakefile", str(tree.root / "workflow" / "Snakefile")]
+        command += ["--directory", str(tree.root), "--cores", "1", "--dry-run", target, "--config", "cases=3", "seed=5"]
+        said = subprocess.run(command, env=tree.environment(), capture_output=True, text=True, timeout=120)
+        assert said.returncode == 0, said.stdout + said.stderr
+        return [
+            (rule, *(part.split(", ") if part else [] for part in (inputs, outputs)))
+            for rule, inputs, outputs in JOB.findall(said.stdout)
+        ]
+
+    return planned
+
+
+def above(made: dict[str, list[str]], path: str) -> set[str]:
+    """Every file that `path` is made from, however far up."""
+    found, waiting = set(), [path]
+    while waiting:
+        more = set(made.get(waiting.pop(), ())) - found
+        found |= more
+        waiting += more
+    return found
+
+
+@pytest.mark.parametrize("target", ["blind", "blind_shuffled", "blind_ablations", "blind_phases"])
+def test_no_diagnosis_has_a_sealed_file_among_what_it_reads(jobs, target):
+    planned = jobs(target)
+    made = {out: inputs for _, inputs, outputs in planned for out in outputs}
+    diagnoses = [(inputs, outputs) for rule, inputs, outputs in planned if rule == "diagnosis"]
+    assert diagnoses
+    for inputs, outputs in diagnoses:
+        assert not [path for path in above(made, outputs[0]) if "/sealed/" in path]
+        assert not [path for path in inputs if "truth" in path or "salt" in path]
+
+
+def test_no_diagnosis_starts_before_all_answers_are_sealed(jobs):
+    planned = jobs("blind")
+    (seals,) = [(inputs, outputs) for rule, inputs, outputs in planned if rule == "seals"]
+    assert sorted(seals[0]) == [f"blind/5/{case}/seal.txt" for case in range(3)]
+    for rule, inputs, _ in planned:
+        if rule in ("diagnosis", "score"):
+            assert seals[1][0] in inputs
+        if rule not in ("invent", "score"):
+            assert not [path for path in inputs if "/sealed/" in path], rule
+
+
+def test_shuffled_paths_are_another_cases(jobs):
+    lent = {
+        o[0].split("/")[2]: {path.split("/")[2] for path in i}
+        for rule, i, o in jobs("blind_shuffled")
+        if rule == "shuffle"
+    }
+    assert all(len(cases) == 2 and own in cases for own, cases in lent.items())
+    assert set.union(*(cases - {own} for own, cases in lent.items())) == set("012")
+
+
+def test_a_mistake_in_what_is_invented_is_one_sentence(tree):
+    tree.choices = {"cases": 1, "seed": 5, "invent": {"pionts": 3}}
+    assert "there is no key 'pionts'; did you mean 'points'?" in tree.says("--dry-run", "blind")
+
+
+@pytest.mark.slow
+def test_a_run_is_invented_sealed_diagnosed_opened_and_scored(tmp_path):
+    for name in ("surgisim", "stages", "workflow", "config", "envs"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(Path(__file__).with_name("stand_in.py"), tmp_path / "stages" / "diagnosis.py")
+    tree, out = Tree(tmp_path, tmp_path / "out"), tmp_path / "out" / "blind" / "4"
+    few = {
+        "points": 30,
+        "spacing": 0.0055,
+        "spacing_coarse": 0.0065,
+        "only": ["fibre"],
+        "snr_low": 1.0,
+        "snr_high": 2.0,
+    }
+    tree.choices = {"cases": 1, "seed": 4, "invent": few}
+    assert tree.run("--keep-going", "blind") == 0
+    board = json.loads((out / "main" / "scoreboard.json").read_text())
+    assert (board["count"], board["seals"], board["seeds"]) == (1, 1, [4])
+    assert board["cases"][0]["verdict"] == "named"
+    files = [out / name for name in ("0/sealed/truth.json", "seals.txt", "0/main/diagnosis.json", "0/main/score.json")]
+    assert sorted(files, key=lambda path: path.stat().st_mtime_ns) == files
+    assert (out / "main" / "../0/main/diagnosis.html").resolve().is_file()
+    assert not tree.plan("blind") - {("blind",)}
+    # One more case: what was diagnosed stays.
+    tree.choices = {**tree.choices, "cases": 2}
+    again = {job for job in tree.plan("blind") if job[0] in ("diagnosis", "invent")}
+    assert again == {("invent", "4", "1"), ("diagnosis", "4", "1", "main")}
+    # Somebody changes the answer afterwards.
+    tree.choices = {**tree.choices, "cases": 1}
+    answer = out / "0" / "sealed" / "truth.json"
+    answer.write_text(answer.read_text().replace('"noise": 0.0003', '"noise": 0.0001'))
+    assert tree.run("--keep-going", "blind") != 0
+    said = (tree.out / "logs" / "blind" / "4" / "0" / "main" / "score.log").read_text()
+    assert "does not have the seal that was published before the diagnosis" in said
+    assert not (out / "0" / "main" / "score.json").exists()
