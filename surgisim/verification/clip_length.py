@@ -124,7 +124,9 @@ def draw(result: dict):
         ax.loglog(frames, y, "o-", color=COLORS[0], label=f"slope {slope:.2f}")
         ax.loglog(frames, y[0] * frames / frames[0], "--", color=COLORS[1], linewidth=1, label="O(n)")
         ax.loglog(frames, y[0] * (frames / frames[0]) ** 2, ":", color=COLORS[2], linewidth=1, label="O(n^2)")
-        ax.set(xlabel="frames of the clip", ylabel=label, title=TITLE)
+        ax.set(xlabel="frames of the clip", ylabel=label, title=TITLE if ax is left else "")
+        ax.set_xticks(frames, [str(n) for n in frames])
+        ax.set_xticks([], minor=True)
         ax.legend(frameon=False, fontsize=8)
     return figure
 
