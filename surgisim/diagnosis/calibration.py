@@ -16,7 +16,7 @@ RIVAL = 0.7
 """Share of the best law's gain beyond which the engine runs another law too."""
 SLACK = 120.0
 """chi square that a smooth field gains where nothing is hidden, beyond simulated nulls: the simulator's error."""
-SECOND = 0.12
+SECOND = 0.2
 """Share of it that a second law must add."""
 ALIKE = 0.85
 """|cos| of whitened signatures beyond which two laws are not told apart."""

@@ -79,11 +79,19 @@ def diagnose(
         laws = by_law(findings)
     ranked, refits = sorted(laws, key=lambda term: -laws[term][0]), []
     if detected:
-        rivals = [t for t in ranked if laws[t][2][0].gain > calibration.RIVAL * laws[ranked[0]][2][0].gain]
-        for n, term in enumerate(rivals[: settings.refine]):
-            progress(0.65 + 0.2 * n / settings.refine, 1, f"the engine with {term}")
+        best = laws[ranked[0]][2][0].gain
+        waiting = [t for t in ranked if laws[t][2][0].gain > calibration.RIVAL * best][: settings.refine]
+        while waiting:
+            term = waiting.pop(0)
+            progress(0.65 + 0.02 * len(refits), 1, f"the engine with {term}")
             fine, evidence = sharpened(case, laws[term], case.z)
             refits.append(refit(case, fine, evidence, case.z))
+            known = {r.term for r in refits}
+            top = max(r.log_evidence for r in refits)
+            rest = [t for t in ranked if t not in known and t not in waiting and laws[t][0] > top]
+            if not waiting and len(refits) < 2 * settings.refine:
+                # What the engine does not confirm gives way to what the tangent puts next.
+                waiting = rest[:1]
         refits.sort(key=lambda r: -r.log_evidence)
         for n, one in enumerate(refits[: settings.free]):
             done = 0.75 + 0.1 * n / settings.free
@@ -144,7 +152,7 @@ def threshold(laws: dict, settings: Diagnosing) -> float:
     return max(calibration.THRESHOLD, float(np.quantile(highest, 0.95)))
 
 
-def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: int = 2) -> Refit:
+def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: int = 3) -> Refit:
     """The law in the engine, its strength by secants of its response; what the tangent left out is put back.
 
     Where the engine breaks down, a weaker law is tried once, then the tangent's word is taken.
@@ -162,7 +170,7 @@ def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: 
         G, b = float(case.space.gram(white, white)[0, 0]), float(case.space.gram(white, z[:, None])[0, 0])
         best = b / max(G, 1e-12)
         # Near its best strength a response may be scaled; far from it, only another run tells.
-        scale = float(np.clip(best, 0.7, 1.4))
+        scale = float(np.clip(best, 0.3, 1.4))
         mine = 2 * scale * b - scale**2 * G
         if mine > gain:
             gain, response, kept = mine, scale * change, scale * amplitude

@@ -15,6 +15,9 @@ from surgisim.mpm.simulator import Run
 from surgisim.physics.catalogue import choose
 from surgisim.physics.place import Place
 
+SPHERE = 0.45
+"""2 (4 - 5 nu) / 15 (1 - nu) near nu = .45."""
+SOFTEST, STIFFEST = 0.06, 40.0
 NEVER = 59.0
 """An end after every clip [s]."""
 
@@ -52,7 +55,7 @@ def law_of(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> Law:
     if term == "tool_slip":
         return Law({}, {}, _slipped(clip, h, a))
     if term in ("stiff_inclusion", "base_layer"):
-        return Law({"stiff_inclusion": {"s": float(np.clip(math.exp(a), 0.06, 40.0))}}, {"stiff_inclusion": h.place})
+        return Law({"stiff_inclusion": {"s": stiffness_of(a)}}, {"stiff_inclusion": h.place})
     if term == "stiffening":
         return Law({term: {"k": a}}, {})
     if term == "fibre":
@@ -77,6 +80,17 @@ def law_of(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> Law:
     own = {"onset": onset, "period": period, "duty": 0.5, "slowness": slowness, "yaw": yaw, "pitch": pitch}
     begins = h.onset + 0.15 if h.onset else 0.0
     return Law({"active_contraction": {"tension": a, **own}}, {}, begins=begins)
+
+
+def stiffness_of(amplitude: float) -> float:
+    """How stiff a lump is whose effect, to first order, would be that of s = 1 + amplitude.
+
+    A stiff lump takes up ever less strain: amplitude = (s - 1) / (1 + b (s - 1)), with b of a sphere in tissue that
+    hardly changes its volume (Eshelby 1957, section 4).
+    """
+    left = 1 - SPHERE * amplitude
+    s = 1 + amplitude / left if left > 0 else STIFFEST
+    return float(np.clip(s, SOFTEST, STIFFEST))
 
 
 def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = None) -> np.ndarray:
@@ -198,7 +212,7 @@ def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Cl
                 wide = np.hypot(np.log1p(share), by_stiffness if h.term in FORCES else 0.0)
                 low, high = value * np.exp(-wide), value * np.exp(wide)
             elif key == "s":
-                low, high = value ** (1 - share), value ** (1 + share)
+                low, high = (stiffness_of(float(amplitude[0]) * (1 + side * share)) for side in (-1, 1))
             result[key] = {
                 "value": float(value),
                 "low": float(min(low, high)),

@@ -81,12 +81,12 @@ class Whitener:
         scaled = field * (self.mask * self.scale[:, None])[..., None]
         mode = np.tensordot(self.axes.T, np.moveaxis(scaled, -3, 0), (1, 0))
         shape = mode.shape
-        mode = np.moveaxis(mode, -2, 1).reshape(shape[0], shape[-2], -1)
+        mode = np.moveaxis(mode, -2, 1).reshape(shape[0], shape[-2], int(np.prod(shape[1:-2])) * shape[-1])
         white = self.inverse @ mode
         white = white - self.still[:, :, None] * (self.still[:, None] @ white)
         white = white.reshape(shape[0], shape[-2], *shape[1:-2], shape[-1])
         white = np.moveaxis(np.moveaxis(white, 1, -2), 0, -3)
-        return white.reshape(*white.shape[:-3], -1)
+        return white.reshape(*white.shape[:-3], int(np.prod(white.shape[-3:])))
 
     def back(self, white: np.ndarray) -> np.ndarray:
         """The transpose: of numbers (K T 3,), as (K, T, 3)."""

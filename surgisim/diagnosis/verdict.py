@@ -32,12 +32,14 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         first = refits[0]
         explained = first.gain / total
         accepted = [first]
-        if second is not None and second[0].gain > calibration.SECOND * total:
+        # What the first law's signature has wrong must not pass for a second law.
+        least = calibration.THRESHOLD + calibration.MISFIT * first.gain
+        if second is not None and second[0].gain > calibration.SECOND * total and second[1] > least:
             accepted.append(second[0])
             explained = min((first.gain + second[0].gain) / total, 1.0)
         alike = [r for r in refits[1:] if _cos(case, first, r) > calibration.ALIKE and chances[r.term] > 0.1]
         verdict = "named"
-        if explained < calibration.EXPLAINED:
+        if explained < calibration.EXPLAINED or first.log_evidence < calibration.THRESHOLD:
             verdict = "unexplained"
         elif alike and chances[first.term] < calibration.SURE:
             verdict = "equivalence class"
@@ -46,7 +48,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         effects = [_effect(case, r, chances, laws, refits, n) for n, r in enumerate(accepted)]
         if verdict == "unexplained":
             for effect in effects:
-                effect["probability"] = min(effect["probability"], explained / 2)
+                effect["probability"] = min(effect["probability"], float(np.clip(explained / 2, 0.0, 0.5)))
     placebo = _placebo(case, refits, laws, rng) if detected else base.simulated
     fit, held_out = errors(case, after, placebo)
     z, reach = symptom(clip, case.noise, residual(case, base.simulated, False), rng)
