@@ -60,6 +60,8 @@ class Case:
     """Whitened residual of the base, (N,)."""
     nulls: np.ndarray
     """(N, D)"""
+    slopes: slice
+    """Where the base's own columns stand in the metric."""
 
 
 def diagnose(
@@ -129,7 +131,8 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     space = metric(np.concatenate(parts, 1))
     z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
     nulls = space.draw(np.random.default_rng(settings.seed), settings.nulls, whiten.without_constant)
-    return Case(clip, settings, noise, whiten, base, space, memo, z, nulls)
+    first = sum(part.shape[1] for part in parts[:2])
+    return Case(clip, settings, noise, whiten, base, space, memo, z, nulls, slice(first, first + len(base.slopes)))
 
 
 def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts | None = None) -> list[Finding]:

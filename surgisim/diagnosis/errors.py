@@ -25,9 +25,9 @@ def rms(case, simulated) -> tuple[float, float | None]:
     return fitted, 1e3 * float(np.sqrt(np.nanmean(square[:, until:])))
 
 
-def errors(case, after, placebo) -> tuple[dict, dict]:
+def errors(case, after, placebo, sigma: float) -> tuple[dict, dict]:
     clip, until = case.clip, case.clip.until
-    floor = 1e3 * np.sqrt(3) * case.noise.sigma
+    floor = 1e3 * np.sqrt(3) * sigma
     rows = {name: rms(case, s) for name, s in (("before", case.base.simulated), ("after", after), ("placebo", placebo))}
     left = residual(case, case.base.simulated, False)
     parts = []

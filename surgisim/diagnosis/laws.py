@@ -73,13 +73,22 @@ def law_of(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> Law:
         yaw, pitch = angles(clip.normal)
         own = {"share": 1.0, "stiffness": h.about["stiffness"], "yaw": yaw, "pitch": pitch}
         return Law({term: {**own, "cap": h.about["cap"] / max(a, 1e-3)}}, {})
+    return Law({"active_contraction": {"tension": a, **_waves(h, clip)}}, {})
+
+
+def _waves(h: Hypothesis, clip: Clip) -> dict[str, float]:
+    """The rhythm of a contraction. The law counts from what the first frame holds already (`- w(0)`): waves that set in
+    later must find every part at rest in that frame, waves from the start find it in their midst."""
     yaw, pitch = angles(h.about["axis"])
     period, slowness = h.about["period"], h.about["period"] / h.about["wavelength"]
-    # Whole periods earlier, so that every part of the body is in its rhythm when it sets in.
-    onset = -h.about["phase"] / (2 * np.pi) * period - 4 * period
-    own = {"onset": onset, "period": period, "duty": 0.5, "slowness": slowness, "yaw": yaw, "pitch": pitch}
-    begins = h.onset + 0.15 if h.onset else 0.0
-    return Law({"active_contraction": {"tension": a, **own}}, {}, begins=begins)
+    onset = -h.about["phase"] / (2 * np.pi) * period
+    along = clip.body.rest.astype(float) @ np.asarray(h.about["axis"], float)
+    earliest = slowness * (along.min() - along.mean())
+    if h.onset:
+        onset += period * math.ceil((max(h.onset - period / 2, -earliest) - onset) / period)
+    else:
+        onset -= period * math.ceil((onset + slowness * (along.max() - along.mean())) / period)
+    return {"onset": onset, "period": period, "duty": 0.5, "slowness": slowness, "yaw": yaw, "pitch": pitch}
 
 
 def stiffness_of(amplitude: float) -> float:

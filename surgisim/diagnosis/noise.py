@@ -6,7 +6,7 @@ An axis of the error of point k at frame t is modelled as
 
 shared: c exp(-|x - x'|^2 / 2 l^2) + rigid (a constant and a gradient over the tissue), in time rho^|t - t'|; lasting: a
 r^|t - t'|; white: b. The numbers are those of largest restricted likelihood on frames in which the tissue is still,
-each stretch less its own line in time, so that what physics moves slowly is not counted as noise (Patterson and
+each stretch less its own polynomial in time, so that what physics moves slowly is not counted as noise (Patterson and
 Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika 58, 1971). In the eigenvectors
 of the spatial part every mode is a time series of its own, which a Cholesky factor whitens.
 """
@@ -14,10 +14,13 @@ of the spatial part every mode is a time series of its own, which a Cholesky fac
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 from scipy.optimize import minimize
 
 MOST_POINTS = 90
 """Points whose covariance is fitted; all are whitened."""
+SLOW = 4
+"""Frames for each degree of the polynomial that is taken off a stretch."""
 STRETCH = 24
 """Frames of a stretch where no frames are known to be still."""
 
@@ -127,8 +130,8 @@ def estimate(moved: np.ndarray, seen: np.ndarray, rest: np.ndarray, still: np.nd
         mine = chosen[seen[np.ix_(chosen, frames)].all(1)]
         if len(mine) < 4:
             continue
-        line = np.vander(np.linspace(-1, 1, len(frames)), 2)
-        basis = np.linalg.qr(line, mode="complete")[0][:, 2:]
+        slow = legvander(np.linspace(-1, 1, len(frames)), max(1, len(frames) // SLOW))
+        basis = np.linalg.qr(slow, mode="complete")[0][:, slow.shape[1] :]
         data.append(
             (
                 rest[mine],

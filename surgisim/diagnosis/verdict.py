@@ -14,6 +14,8 @@ from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import described, law_of, respond
 from surgisim.diagnosis.locate import cause, of_places, symptom
 from surgisim.diagnosis.model import base_numbers, physics
+from surgisim.diagnosis.noise import estimate
+from surgisim.diagnosis.together import together
 from surgisim.mpm.simulator import Breakdown
 
 RUNNERS = 4
@@ -43,15 +45,20 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
             verdict = "unexplained"
         elif alike and chances[first.term] < calibration.SURE:
             verdict = "equivalence class"
-        for r in accepted:
-            after = after + r.response
+        after = together(case, accepted)
         effects = [_effect(case, r, chances, laws, refits, n) for n, r in enumerate(accepted)]
         if verdict == "unexplained":
             for effect in effects:
                 effect["probability"] = min(effect["probability"], float(np.clip(explained / 2, 0.0, 0.5)))
     placebo = _placebo(case, refits, laws, rng) if detected else base.simulated
-    fit, held_out = errors(case, after, placebo)
-    z, reach = symptom(clip, case.noise, residual(case, base.simulated, False), rng)
+    # With the effect taken off, quiet frames show the noise alone.
+    quiet = slice(0, clip.until)
+    noise = estimate(
+        residual(case, after, False)[:, quiet], clip.seen[:, quiet], clip.rest, clip.quiet()[quiet],
+        clip.recording.sigma[clip.kept],
+    )  # fmt: skip
+    fit, held_out = errors(case, after, placebo, noise.sigma)
+    z, reach = symptom(clip, noise, residual(case, base.simulated, False), rng)
     freed = case.z - case.space.explained(case.z)
     cleared = case.nulls - case.space.explained(case.nulls)
     heat, when = cause(base, case.whiten, freed, cleared)
@@ -77,8 +84,8 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         unexplained_fraction=float(np.clip(1 - explained, 0, 1)) if detected else 0.0,
         words=said,
         base=base_numbers(base),
-        noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(case.noise).items()}
-        | {"sigma": case.noise.sigma, "unit": "m"},
+        noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(noise).items()}
+        | {"sigma": noise.sigma, "unit": "m"},
         global_test={
             "log_evidence": float(laws[ranked[0]][0]),
             "nulls": np.round(np.max([n for _, n, _ in laws.values()], 0), 3).tolist(),

@@ -7,7 +7,6 @@ from planted import GRID, recording
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis.calibration import THRESHOLD
 from surgisim.diagnosis.diagnose import diagnose
-from surgisim.diagnosis.laws import SPHERE, stiffness_of
 from surgisim.diagnosis.memo import Memo
 
 SETTINGS = Diagnosing(grid=GRID, nulls=8, experiment=False, free=0)
@@ -58,8 +57,3 @@ def test_the_mismatch_covers_every_point_frame_and_particle(tilted):
     assert mismatch.cause.min() >= 0
     assert mismatch.cause.max() == pytest.approx(1.0)
     assert np.isfinite(mismatch.residual_after[np.isfinite(mismatch.residual_before)]).all()
-
-
-@pytest.mark.parametrize("s", [0.2, 0.7, 1.5, 6.0])
-def test_a_lump_answers_as_a_sphere_does(s):
-    assert stiffness_of((s - 1) / (1 + SPHERE * (s - 1))) == pytest.approx(s)
