@@ -1,11 +1,12 @@
 """What a body lacks that is let go and swings: each law in the engine itself, fitted, and tried on another take.
 
 The diagnosis of pulled tissue answers forces by a tangent stiffness, which a body that swings does not obey. Here
-nothing is linearised: every candidate is run, its first number scanned and all of them fitted to one take, and what is
+nothing is linearised: every candidate is run, its numbers scanned and then fitted to one take, and what is
 named is the law under which another take, never fitted, is predicted best. A law within CLOSE of the best there cannot
 be told from it.
 """
 
+import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -36,10 +37,8 @@ class Law:
     name: str
     make: Make
     """Its values and places from its numbers."""
-    scan: tuple[float, ...]
-    """Values of the first number that are tried before the fit."""
-    others: tuple[float, ...] = ()
-    """Where the other numbers start."""
+    scan: tuple[tuple[float, ...], ...]
+    """For each number the values that are tried before the fit, all combinations of them."""
     low: tuple[float, ...] = ()
     high: tuple[float, ...] = ()
 
@@ -89,7 +88,7 @@ def try_law(law: Law, base: Values, take: Recording, other: Recording, spacing: 
         values, places = law.make(x)
         return misfit(on, simulate(on, {**base, **values}, places, spacing, frames))
 
-    starts = [np.array([first, *law.others]) for first in law.scan]
+    starts = [np.array(x) for x in itertools.product(*law.scan)]
     errors = []
     for x in starts:
         try:
