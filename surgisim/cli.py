@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from surgisim.stage import plain_errors
+from surgisim.stage import Progress, plain_errors
 
 app = typer.Typer(
     help="From a monocular surgical video to a simulation with the tissue's own physics.",
@@ -112,15 +112,24 @@ def demo(
 @app.command()
 def diagnose(
     recording: Annotated[Path, typer.Argument(help="A recording folder (docs/diagnosis.md).")],
-    out: Annotated[Path, typer.Option(help="Folder for diagnosis.json, physics.json, mismatch.npz and mismatch.ply.")],
+    out: Annotated[
+        Path,
+        typer.Option(help="Folder for diagnosis.html, diagnosis.json, physics.json, mismatch.npz and mismatch.ply."),
+    ],
     set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A setting; repeatable.")] = None,
     debug: Debug = False,
 ) -> None:
     """Say what physics a recording's simulation lacks, and how surely; a second start goes on where one stopped."""
+    from surgisim.artifacts.base import save_bytes
     from surgisim.diagnosis.files import carry_out
+    from surgisim.report.diagnosed.case import read
+    from surgisim.report.diagnosed.page import page
 
     with plain_errors(debug):
         typer.echo(carry_out(recording, out, tuple(set_ or ())))
+        files = (out / name for name in ("diagnosis.json", "mismatch.npz", "physics.json"))
+        save_bytes({out / "diagnosis.html": page(read(recording, *files), progress=Progress("page"))})
+        typer.echo(f"{out / 'diagnosis.html'} shows it.")
 
 
 @app.command()
