@@ -7,8 +7,8 @@ import re
 
 import numpy as np
 import pytest
-from proof import made_up_case
-from proof.made_up_case import diagnosis, effect, named
+from proof import made_up
+from proof.made_up import diagnosis, effect, named
 from proof.test_score import scored
 
 from surgisim.problem import Problem
@@ -125,7 +125,7 @@ def hash_of(label: str) -> float:
 
 
 def test_rounded_positions_are_noticed(tmp_path):
-    made_up_case.case(tmp_path)
+    made_up.case(tmp_path)
     path = tmp_path / "recording" / "tracks.npz"
     arrays = dict(np.load(path))
     exact = features(tmp_path / "recording")["last byte zero"]
@@ -137,7 +137,7 @@ def test_rounded_positions_are_noticed(tmp_path):
 def test_shuffled_paths_belong_to_another_body():
     assert sorted(partner(i, 7, 3) for i in range(7)) == list(range(7))
     assert all(partner(i, 7, 3) != i for i in range(7))
-    own, other = made_up_case.recording("r-own", seed=1), made_up_case.recording("r-other", extra=5e-3, seed=2)
+    own, other = made_up.recording("r-own", seed=1), made_up.recording("r-other", extra=5e-3, seed=2)
     mixed = shuffled(own, other)
     assert (mixed.name, mixed.fps, mixed.frames) == ("r-own", own.fps, own.frames)
     assert (mixed.attached() == own.attached()).all()
@@ -149,7 +149,7 @@ def test_shuffled_paths_belong_to_another_body():
 
 
 def test_a_shorter_clip_lacks_what_comes_later():
-    whole = made_up_case.recording()
+    whole = made_up.recording()
     assert phases(whole) == ["rest", "load", "hold", "release"]
     assert phases(shortened(whole, "hold")) == ["rest", "load", "hold"]
     assert phases(shortened(whole, "load")) == ["rest", "load"]

@@ -4,17 +4,17 @@ import dataclasses
 
 import numpy as np
 import pytest
-from proof import made_up_case
+from proof import made_up
 
 from surgisim.proof.rigs import let_go
 from surgisim.proof.rigs.let_go import Law, name
 
-FPS = made_up_case.FPS
+FPS = made_up.FPS
 
 
 def swinging(decay: float, sag: float, amplitude: float, seed: int):
     """A take of points that ring down by `decay` [1/s] about a rest `sag` [m] lower."""
-    take = made_up_case.recording(seed=seed)
+    take = made_up.recording(seed=seed)
     t = np.arange(take.frames) / FPS
     y = amplitude * np.exp(-decay * t) * np.cos(2 * np.pi * t) - amplitude - sag * (1 - np.cos(2 * np.pi * t))
     points = take.attached()[:, None] + y[None, :, None] * np.array([0.0, 0.0, 1.0])

@@ -5,8 +5,8 @@ import json
 
 import numpy as np
 import pytest
-from proof import made_up_case
-from proof.made_up_case import diagnosis, effect, named
+from proof import made_up
+from proof.made_up import diagnosis, effect, named
 
 from surgisim.artifacts.base import load
 from surgisim.artifacts.mismatch import Mismatch
@@ -33,7 +33,7 @@ def unsealed(folder, **changed):
 
 
 def scored(folder, **case):
-    made_up_case.case(folder, **case)
+    made_up.case(folder, **case)
     verdict, left = read_verdict(folder / "diagnosis.json"), load(Mismatch, folder / "mismatch.npz")
     return score(unsealed(folder), read_recording(folder / "recording"), verdict, left, CELL)
 
@@ -150,7 +150,7 @@ def test_a_points_constant_offset_is_no_error_but_what_stays_after_a_pull_is():
 
 
 def test_a_diagnosis_of_fewer_points_is_scored_on_those(tmp_path):
-    made_up_case.case(tmp_path, extra=3e-3)
+    made_up.case(tmp_path, extra=3e-3)
     left = load(Mismatch, tmp_path / "mismatch.npz")
     names = ("points", "residual_before", "residual_after", "z")
     few = dataclasses.replace(left, **{name: getattr(left, name)[3:] for name in names})
@@ -161,22 +161,22 @@ def test_a_diagnosis_of_fewer_points_is_scored_on_those(tmp_path):
 
 
 def test_another_truth_is_not_opened(tmp_path):
-    made_up_case.case(tmp_path)
+    made_up.case(tmp_path)
     changed = (tmp_path / "sealed/truth.json").read_bytes().replace(b"stiff_inclusion", b"tether_inclusio")
     with pytest.raises(Problem, match="does not have the seal"):
         unsealed(tmp_path, truth=changed)
 
 
 def test_a_seal_that_was_not_published_before_is_refused(tmp_path):
-    made_up_case.case(tmp_path)
+    made_up.case(tmp_path)
     with pytest.raises(Problem, match="not in the log of seals"):
         unsealed(tmp_path, published="0 " + 64 * "0")
 
 
 def test_other_noise_free_paths_are_refused(tmp_path):
-    made_up_case.case(tmp_path)
+    made_up.case(tmp_path)
     with pytest.raises(Problem, match=r"truth\.npz is not the file"):
-        unsealed(tmp_path, tracks=made_up_case.npz(plain=np.zeros(3), true=np.zeros(3)))
+        unsealed(tmp_path, tracks=made_up.npz(plain=np.zeros(3), true=np.zeros(3)))
 
 
 def test_files_of_two_cases_are_not_scored_together(tmp_path):

@@ -53,14 +53,14 @@ class World:
         return np.stack([x, y], -1).astype(float)
 
 
-def made_up_case(folder: Path, *, size: tuple[int, int] = (40, 48), frames: int = 12, seed: int = 0, **changed) -> dict:
+def made_up(folder: Path, *, size: tuple[int, int] = (40, 48), frames: int = 12, seed: int = 0, **changed) -> dict:
     """Write every artifact kind and return name -> path; `changed` replaces artifacts by name."""
     made = invent(size, frames, seed) | changed
     paths = {}
     for name, artifact in made.items():
         if artifact is not None:
             paths[name] = folder / (name + artifact.SUFFIX)
-            save(artifact, paths[name], producer="made_up_case", settings={}, code="")
+            save(artifact, paths[name], producer="made_up", settings={}, code="")
     return paths
 
 
@@ -115,7 +115,7 @@ def _world(size: tuple[int, int], frames: int, seed: int) -> World:
         frames=frames,
         scale="arbitrary",
         focal_from="assumed",
-        source="made_up_case",
+        source="made_up",
         source_size=[width, height],
         crop=[0, 0, width, height],
     )

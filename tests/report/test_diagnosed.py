@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from proof import made_up_case
-from proof.made_up_case import diagnosis, named
+from proof import made_up
+from proof.made_up import diagnosis, named
 from report.browser import Browser, installed
 
 from surgisim.artifacts.verdict import Effect
@@ -32,7 +32,7 @@ VERDICTS = {
 
 
 def shown(folder, told) -> bytes:
-    made = made_up_case.case(folder, extra=2e-3, told=told)
+    made = made_up.case(folder, extra=2e-3, told=told)
     return page(read(made / "recording", made / "diagnosis.json", made / "mismatch.npz", made / "physics.json"))
 
 
@@ -81,7 +81,7 @@ def test_a_pull_in_words_is_drawn(tmp_path):
     words = (
         "Grasp near (30, 30, 20) mm, pull 5 mm up along (0.00, 0.60, 0.80), hold 1.2 s and release: they would differ."
     )
-    made = made_up_case.case(tmp_path, told=diagnosis(effects=(named(separating_experiment=words),)))
+    made = made_up.case(tmp_path, told=diagnosis(effects=(named(separating_experiment=words),)))
     found = read(made / "recording", made / "diagnosis.json", made / "mismatch.npz", made / "physics.json").experiment
     assert found["center"] == pytest.approx([0.03, 0.03, 0.02])
     assert found["pull"] == pytest.approx([0.0, 0.003, 0.004])
@@ -128,7 +128,7 @@ def test_a_browser_shows_every_picture_of_a_diagnosis(tmp_path):
 
 
 def test_the_stage_writes_the_page(tmp_path):
-    made = made_up_case.case(tmp_path)
+    made = made_up.case(tmp_path)
     flags = [f for n in ("diagnosis.json", "mismatch.npz", "physics.json") for f in (f"--{n.split('.')[0]}", made / n)]
     command = [sys.executable, Path(__file__).parents[2] / "stages" / "diagnosis_report.py", *flags]
     command += ["--recording", made / "recording", "--page", made / "diagnosis.html"]

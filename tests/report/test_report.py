@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import pytest
 from report.browser import Browser, installed
-from report.made_up_case import invent
+from report.made_up import invent
 
 from surgisim.artifacts.metrics import Metrics
 from surgisim.artifacts.motion import Motion
@@ -33,7 +33,7 @@ def story(made, **changed) -> Story:
     made = made | changed
     truth = made["truth"] and seen(made["truth"], made["camera"])
     run = Run(**{n: made[n] for n in NAMES}, truth=truth)
-    metrics = Metrics("made_up_case", "main", score(run, lpips=None, first=4), COST)
+    metrics = Metrics("made_up", "main", score(run, lpips=None, first=4), COST)
     return Story(run, made["deformation"], made["material"], metrics, Report(panel=120, cell=96))
 
 
@@ -110,9 +110,9 @@ def test_the_summary_marks_the_best_of_a_row(made):
     metrics = story(made).metrics
     worse = score_with(metrics, "simulation", "true_held_out", 2.0)
     runs = [metrics, dataclasses.replace(worse, variant="elastic")]
-    row = table(runs)["made_up_case"]["simulation.true_held_out"]
+    row = table(runs)["made_up"]["simulation.true_held_out"]
     assert row["best"] == ["main"]
-    assert table(runs)["made_up_case"]["masking.tool_iou"]["best"] == []
+    assert table(runs)["made_up"]["masking.tool_iou"]["best"] == []
     text = summary(runs).decode()
     assert "elastic/report/report.html" in text
     assert 'class="best"' in text
