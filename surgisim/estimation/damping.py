@@ -31,7 +31,9 @@ def numerical_damping(body, density: float, values: Values, held: np.ndarray, st
         none.reshape(0, 3), none, np.zeros((0, SAMPLES + 1, 3)), np.zeros((0, SAMPLES + 1), bool), none, "none"
     )
     every = max(1, round(DURATION / SAMPLES / step))
-    drive = made.drive(still, values, fps=1 / (every * step), per_frame=every, frames=SAMPLES + 1, held=held)
+    drive = made.drive(
+        still, values, fps=1 / (every * step), per_frame=every, frames=SAMPLES + 1, held=held, firm=False
+    )
     run = simulator.run(made.theta(values), drive, begin=(np.zeros_like(v), v))
     energy = np.array([_energy(made, values, drive, held, u, w) for u, w in zip(run.u, run.v, strict=True)])
     time = np.arange(SAMPLES + 1) * every * step

@@ -82,7 +82,7 @@ def estimate(
     fitted = fitted_frames(frames.split)
     held_out = np.setdiff1d(np.arange(1, total), fitted)
     phase = phases(motion, total)
-    trial = Trial(bodies, wanted, motion, observation, body.held, camera.fps, total, fitted)
+    trial = Trial(bodies, wanted, motion, observation, body.held, camera.fps, total, fitted, firm=False)
     choices = supports(body, camera)
     support, x, history, table = choices[0], wanted.start, [], {}
     if settings.enabled:

@@ -37,6 +37,8 @@ class Trial:
     """Frames that may be looked at."""
     grip: float = 1.0
     """How firmly instruments hold, see Physics."""
+    firm: bool = True
+    """Whether the boundary is known to hold there, see Prepared.drive."""
 
     def per_frame(self, values: Values, *, safety: float = SAFETY, stiffest=None) -> int:
         """Steps between two frames that are stable for `stiffest` (or `values`)."""
@@ -51,7 +53,7 @@ class Trial:
         per_frame = per_frame or self.per_frame(values, safety=safety, stiffest=stiffest)
         return self.bodies[0].drive(
             self.motion, values, fps=self.fps, per_frame=per_frame, frames=frames or self.frames, held=self.held,
-            grip=self.grip,
+            grip=self.grip, firm=self.firm,
         )  # fmt: skip
 
     def theta(self, values: Values) -> np.ndarray:

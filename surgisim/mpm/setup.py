@@ -75,8 +75,12 @@ class Prepared:
         held: np.ndarray | None = None,
         grip: float = 1.0,
         places: Mapping[str, Place] | None = None,
+        firm: bool = True,
     ) -> Drive:
         """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values` at `places`.
+
+        firm: whether the base is known to hold, as in a recording that says so. Where it is guessed, as in a video, one that
+        gives way a little is the better guess: held hard at the wrong place, a release fits a modulus many times too high.
 
         A grip smaller than a cell is widened to one: the grid cannot carry a smaller ball along, and would let
         the tissue slip out of it.
@@ -102,7 +106,8 @@ class Prepared:
         )
         check_speed(path.path, path.step, spacing, fps)
         # Tissue that cannot be squeezed pushes on its base far harder than it shears it.
-        path.stiffness[0] *= max(1.0, BASE * pressure**2 / self._held_motion(held) / spring)
+        if firm:
+            path.stiffness[0] *= max(1.0, BASE * pressure**2 / self._held_motion(held) / spring)
         path = replace(path, share=path.share * self._firmer(self.theta(values, places, held)))
         for name, term in laws.items():
             if term.drive is not None:

@@ -57,6 +57,7 @@ def replay(
         frames=len(task.base),
         held=material.held,
         grip=physics.grip,
+        firm=False,
     )
     clock = np.arange(path.steps + 1) / per_frame
     path.path[0] = np.stack([np.interp(clock, np.arange(len(task.base)), task.base[:, a]) for a in range(3)], -1)

@@ -42,7 +42,7 @@ def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, held=None, seed=0, pl
     per_frame = 2 * made.per_frame(
         {**values, "corotated": {"E": theta[:, 0].max(), "nu": values["corotated"]["nu"]}}, FPS
     )
-    run = made.simulator.run(theta, made.drive(motion, values, fps=FPS, per_frame=per_frame, held=held))
+    run = made.simulator.run(theta, made.drive(motion, values, fps=FPS, per_frame=per_frame, held=held, firm=False))
     points = body.rest[body.surface].astype(float)
     rng = np.random.default_rng(seed)
     carry = made.simulator.carry(points)
