@@ -79,8 +79,9 @@ class Prepared:
     ) -> Drive:
         """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values` at `places`.
 
-        firm: whether the base is known to hold, as in a recording that says so. Where it is guessed, as in a video, one that
-        gives way a little is the better guess: held hard at the wrong place, a release fits a modulus many times too high.
+        firm: whether the base is known to hold, as in a recording that says so. Where it is guessed, as in a video,
+        one that gives way a little is the better guess: held hard at the wrong place, a release fits a modulus many
+        times too high.
 
         A grip smaller than a cell is widened to one: the grid cannot carry a smaller ball along, and would let
         the tissue slip out of it.
