@@ -37,8 +37,6 @@ class Refit:
     """What it adds to the base at this amplitude over the whole clip [m], (K, T, 3)."""
     gain: float
     log_evidence: float
-    free: bool = False
-    """Whether its place, time and form were fitted too."""
 
     @property
     def term(self) -> str:
@@ -193,7 +191,7 @@ def freed(case: Case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> 
         return one
     finding = replace(one.finding, hypothesis=found.hypothesis, spread=found.spread)
     better = {"finding": finding, "amplitude": found.amplitude, "response": found.response, "gain": found.gain}
-    return replace(one, **better, log_evidence=one.log_evidence + 0.5 * (found.gain - one.gain), free=True)
+    return replace(one, **better, log_evidence=one.log_evidence + 0.5 * (found.gain - one.gain))
 
 
 def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:

@@ -26,9 +26,11 @@ def rms(case, simulated) -> tuple[float, float | None]:
 
 
 def errors(case, after, placebo, sigma: float) -> tuple[dict, dict]:
+    """What diagnosis.json says of fitted frames and of those held out; placebo None where there is none."""
     clip, until = case.clip, case.clip.until
     floor = 1e3 * np.sqrt(3) * sigma
-    rows = {name: rms(case, s) for name, s in (("before", case.base.simulated), ("after", after), ("placebo", placebo))}
+    rows = {name: rms(case, s) for name, s in (("before", case.base.simulated), ("after", after))}
+    rows["placebo"] = (None, None) if placebo is None else rms(case, placebo)
     left = residual(case, case.base.simulated, False)
     parts = []
     for span in (slice(0, until), slice(until, clip.frames)):

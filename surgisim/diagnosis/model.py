@@ -23,27 +23,31 @@ def base_numbers(base) -> dict:
 
 
 def physics(case, refits) -> Physics:
-    """The base's laws, and the named one, with the grid and the step they were fitted on."""
+    """The base's laws and the named ones, with the grid and a stable step."""
     clip, base = case.clip, case.base
     step = base.drive.step
-    values, places, known = dict(base.values), {}, base_numbers(base)
-    if refits:
-        law = law_of(refits[0].finding.hypothesis, refits[0].amplitude, clip)
-        values |= law.values
-        if law.values:
-            prepared = clip.prepared(tuple(values))
-            step = 1 / clip.fps / steps(clip, base, prepared, prepared.theta(values, law.places))
-        h = refits[0].finding.hypothesis
+    values, where, known = dict(base.values), {}, base_numbers(base)
+    for r in refits:
+        h, law = r.finding.hypothesis, law_of(r.finding.hypothesis, r.amplitude, clip)
+        own = law.values
         if h.term == "tool_slip":
-            values["tool_slip"] = {"slip": min(float(refits[0].amplitude[0]), 1.0), "onset": float(h.onset)}
-        places = {
-            n: {
-                "center": [float(c) for c in p.center],
-                "extent": float(p.extent),
-                "normal": None if p.normal is None else [float(c) for c in p.normal],
-            }
-            for n, p in law.places.items()
+            own = {"tool_slip": {"slip": min(float(r.amplitude[0]), 1.0), "onset": float(h.onset)}}
+        if set(own) & set(values):
+            # A body has each law once: where the second effect needs the first one's again, the first stays.
+            continue
+        values |= own
+        where |= law.places
+    if where or len(values) > len(base.values):
+        prepared = clip.prepared(tuple(values))
+        step = 1 / clip.fps / steps(clip, base, prepared, prepared.theta(values, where))
+    places = {
+        n: {
+            "center": [float(c) for c in p.center],
+            "extent": float(p.extent),
+            "normal": None if p.normal is None else [float(c) for c in p.normal],
         }
+        for n, p in where.items()
+    }
     terms = {
         name: {
             key: {"value": float(value), "unit": term.params[key].unit}

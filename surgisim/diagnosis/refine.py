@@ -20,7 +20,7 @@ from surgisim.diagnosis.metric import Metric
 from surgisim.diagnosis.noise import Whitener
 from surgisim.estimation.trial import at_once
 from surgisim.mpm.simulator import Breakdown
-from surgisim.problem import Problem
+from surgisim.physics.place import Misplaced
 
 LOGARITHMS = {
     "tau": 0.7, "yield_strain": 0.4, "onset": 0.4, "k2": 0.6, "rate": 0.15, "period": 0.15, "wavelength": 0.4,
@@ -61,7 +61,7 @@ def refined(
         try:
             law = law_of(*_turned(h, amplitude, knobs, x, clip), clip)
             return respond(clip, base, law, memo, until) - base.simulated[:, :until]
-        except (Breakdown, Problem):
+        except (Breakdown, Misplaced):
             # A place outside the body, or tissue torn apart: not a law of this clip.
             return None
 

@@ -18,7 +18,8 @@ from surgisim.diagnosis.noise import estimate
 from surgisim.diagnosis.together import together
 from surgisim.mpm.simulator import Breakdown
 
-RUNNERS = 4
+RUNNERS, PLACEBOS = 4, 3
+"""Other laws that an effect lists, and placebos that are tried where the engine breaks down with one."""
 
 
 def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis, Physics, Mismatch]:
@@ -28,7 +29,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
     chances = probabilities(laws, refits, detected)
     total = max(explainable(bend), max([r.gain for r in refits], default=0.0), 1e-9)
     after = base.simulated.copy()
-    effects, explained = [], 0.0
+    effects, accepted, explained = [], [], 0.0
     verdict, alike = "nothing detectable", []
     if detected:
         first = refits[0]
@@ -50,7 +51,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         if verdict == "unexplained":
             for effect in effects:
                 effect["probability"] = min(effect["probability"], float(np.clip(explained / 2, 0.0, 0.5)))
-    placebo = _placebo(case, refits, laws, rng) if detected else base.simulated
+    placebo = _placebo(case, refits, laws, rng) if detected else None
     # With the effect taken off, quiet frames show the noise alone.
     quiet = slice(0, clip.until)
     noise = estimate(
@@ -103,7 +104,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         cause_time=np.concatenate([when, np.zeros(clip.frames - clip.until)]),
         phase=clip.phases(),
     )
-    return diagnosis, physics(case, refits if verdict in ("named", "equivalence class") else []), mismatch
+    return diagnosis, physics(case, accepted if verdict in ("named", "equivalence class") else []), mismatch
 
 
 def explainable(bend) -> float:
@@ -208,8 +209,8 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
     return result
 
 
-def _placebo(case, refits, laws, rng) -> np.ndarray:
-    """The same law at a wrong place, or a wrong law, with its strength fitted all the same."""
+def _placebo(case, refits, laws, rng) -> np.ndarray | None:
+    """The same law at a wrong place, or a wrong law, with its strength fitted all the same; None where none acts."""
     first = refits[0].finding.hypothesis
     mine = laws[refits[0].term][2]
     far = (
@@ -227,13 +228,15 @@ def _placebo(case, refits, laws, rng) -> np.ndarray:
         for t in sorted(laws)
         if t not in {r.term for r in refits[:2]} and laws[t][2][0].hypothesis.mix.shape[1] <= 3
     ]
-    if not others:
-        return case.base.simulated
-    chosen = others[int(rng.integers(len(others)))]
-    try:
-        return respond(case.clip, case.base, law_of(chosen.hypothesis, chosen.amplitude, case.clip), case.memo)
-    except Breakdown:
-        return case.base.simulated
+    # One whose strength came out as nothing is no placebo.
+    acting = [f for f in others if f.size > 0]
+    for k in rng.permutation(len(acting))[:PLACEBOS]:
+        law = law_of(acting[k].hypothesis, acting[k].amplitude, case.clip)
+        try:
+            return respond(case.clip, case.base, law, case.memo)
+        except Breakdown:
+            continue
+    return None
 
 
 def _words(case, verdict, refits, effects, explained, laws, z) -> str:

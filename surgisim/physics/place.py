@@ -9,6 +9,10 @@ from surgisim.physics.catalogue import Numbers, Term
 from surgisim.problem import Problem
 
 
+class Misplaced(Problem):
+    """A law acts where no tissue is."""
+
+
 @dataclass(frozen=True)
 class Place:
     """A blob exp(-d^2 / (2 extent^2)) around a rest position, or all that lies beyond a plane through it.
@@ -44,7 +48,7 @@ def rows(
 
     A column whose parameter has an off value fades to it outside the law's place; a total is shared out over the
     place, per cubic metre. masks: 'held' and 'surface', (P,) bool, for laws that act there only.
-    Raises Problem where a law that needs a place has none, or the place misses the body.
+    Raises Problem where a law that needs a place has none, Misplaced where the place misses the body.
     """
     result = []
     for name, term in terms.items():
@@ -60,7 +64,7 @@ def rows(
             weight = weight * (masks or {}).get(term.on, 0)
         shared = float((weight * volume).sum())
         if shared < 1e-6 * float(volume.sum()):
-            raise Problem(f"law '{name}' finds no tissue to act on: {_where(place, term)}.")
+            raise Misplaced(f"law '{name}' finds no tissue to act on: {_where(place, term)}.")
         row = term.row(values[name])
         if term.spread is not None:
             row |= term.spread(rest, **values[name])
