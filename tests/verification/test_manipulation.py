@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from surgisim.phantom.elements import SLOPES
+from surgisim.phantom.ogrid import mesh
 from surgisim.verification import manipulation
 from surgisim.verification.manipulated.compare import rebound
 from surgisim.verification.manipulated.covariance import covariance, deviation, model_error
-from surgisim.verification.manipulated.mesh import mesh
 from surgisim.verification.manipulated.page import BOUNDS
 from surgisim.verification.manipulated.scene import FINE, FPS, invent
 

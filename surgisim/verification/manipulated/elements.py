@@ -8,8 +8,8 @@ from scipy.spatial import Delaunay
 
 from surgisim.phantom.elements import Elements, elements
 from surgisim.phantom.march import SAFETY, advance, least_swelling, stable_step
+from surgisim.phantom.ogrid import Mesh, mesh
 from surgisim.problem import Problem
-from surgisim.verification.manipulated.mesh import Mesh, mesh
 from surgisim.verification.manipulated.scene import FINE, FPS, Scene
 
 

@@ -12,10 +12,10 @@ from surgisim.estimation.search import search
 from surgisim.estimation.trial import WORKERS, Trial, at_once
 from surgisim.mpm.setup import Values, prepare
 from surgisim.phantom.elements import elements
+from surgisim.phantom.ogrid import Mesh
 from surgisim.physics.place import Place
 from surgisim.verification.manipulated import elements as finite
 from surgisim.verification.manipulated import particles
-from surgisim.verification.manipulated.mesh import Mesh
 from surgisim.verification.manipulated.scene import DENSITY, FINE, FPS, Scene
 
 NOISE = 1e-4
