@@ -18,8 +18,8 @@ class Diagnosing(Settings):
     """Residuals of nothing but noise that go through the same search [1]."""
     refine: int = Field(4, ge=1, le=16)
     """Laws that the engine itself runs again, best first [1]."""
-    free: int = Field(1, ge=0, le=16)
-    """Of them, laws that are fitted with place, time and form free [1]."""
+    free: int = Field(3, ge=0, le=16)
+    """Of them, laws that are fitted at most with place, time, form and base free [1]."""
     second: bool = True
     """Whether a second effect is looked for [1]."""
     noise: Literal["correlated", "independent"] = "correlated"
@@ -30,5 +30,9 @@ class Diagnosing(Settings):
     """Times the measured error of the simulator [1]."""
     calibrated: bool = True
     """Whether the thresholds of the calibration are used; without, any evidence above zero counts [1]."""
+    device: Literal["cpu", "cuda"] = "cpu"
+    """Where the engine runs [-]."""
+    workers: int = Field(2, ge=1, le=64)
+    """Runs side by side where the engine runs on a processor [1]."""
     experiment: bool = True
     """Whether a separating manipulation is simulated [1]."""

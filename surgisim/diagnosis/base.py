@@ -18,7 +18,7 @@ from surgisim.diagnosis.noise import Whitener
 from surgisim.diagnosis.tangent import Tangent, base_piola, tangent
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import Prepared, Values
-from surgisim.mpm.simulator import Run
+from surgisim.mpm.simulator import Breakdown, Run
 
 TERMS = ("neo_hookean_ciarlet", "newtonian")
 START = np.array([np.log(3e3), 0.45, np.log(3e-3)])
@@ -30,7 +30,10 @@ SCAN = (-1.0, -0.35, 0.3, 1.0)
 """Where the descent may start, in logarithms of E and of eta / E away from START."""
 DESCENTS = 8
 """Steps of it at most."""
-SAFETY = 0.8
+SAFETY, BOLD = 0.8, 1.2
+"""Share of the largest step that is guarded (`mpm/stable.py`) that a law's simulation takes, and that a diagnosis' runs
+try first: tracks then differ by some micrometres, and runs break down only from 1.6 on. One that does is run again with
+SAFETY."""
 AFTER = 0.5
 """How long a short run goes on after the release [s]."""
 
@@ -168,17 +171,30 @@ def carried(carry, run: Run) -> np.ndarray:
 def simulate(prepared: Prepared, clip: Clip, x: np.ndarray, memo: Memo, frames: int) -> tuple[Drive, Run]:
     """The base up to frame `frames`, exclusive."""
     values = values_of(x)
-    drive = base_drive(prepared, clip, values)
-    made = memo(
-        ["base", x.tolist(), frames],
-        lambda: vars(prepared.simulator.run(prepared.theta(values), drive, last=frames - 1)),
-    )
-    return drive, Run(**made)
+    made = memo(["base", x.tolist(), frames], lambda: vars(_run(prepared, clip, values, last=frames - 1)))
+    return base_drive(prepared, clip, values), Run(**made)
 
 
-def base_drive(prepared: Prepared, clip: Clip, values: Values) -> Drive:
-    per_frame = prepared.per_frame(values, clip.fps, SAFETY)
+def base_drive(prepared: Prepared, clip: Clip, values: Values, safety: float = BOLD) -> Drive:
+    """What carries the base along."""
+    per_frame = prepared.per_frame(values, clip.fps, safety)
     return prepared.drive(clip.motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames)
+
+
+def _run(prepared: Prepared, clip: Clip, values: Values, **span) -> Run:
+    return boldly(
+        lambda safety: prepared.simulator.run(
+            prepared.theta(values), base_drive(prepared, clip, values, safety), **span
+        )
+    )
+
+
+def boldly(run: Callable[[float], Run]) -> Run:
+    """A run at a safety of the step, with BOLD first. Raises Breakdown where SAFETY breaks down too."""
+    try:
+        return run(BOLD)
+    except Breakdown:
+        return run(SAFETY)
 
 
 def _by_poisson(prepared, near: Tangent, x) -> np.ndarray:
@@ -192,10 +208,8 @@ def _by_poisson(prepared, near: Tangent, x) -> np.ndarray:
 
 
 def _short(clip, prepared, x, run, carry, first, last) -> np.ndarray:
-    values = values_of(x)
-    drive = base_drive(prepared, clip, values)
     begin = run.state(first) if first else None
-    moved = prepared.simulator.run(prepared.theta(values), drive, begin=begin, first=first, last=last)
+    moved = _run(prepared, clip, values_of(x), begin=begin, first=first, last=last)
     return carried(carry, moved)[:, 1:]
 
 

@@ -12,8 +12,10 @@ MISFIT = 0.05
 """Share of the explained chi square that signatures of the right law leave wrong."""
 EXPLAINED = 0.55
 """Share of the explainable misfit that a law must explain to be named."""
-RIVAL = 0.7
+RIVAL = 0.5
 """Share of the best law's gain beyond which the engine runs another law too."""
+CLOSE = 0.5
+"""Share of the best law's gain, as the engine ran both, beyond which a law is fitted with everything free too."""
 SLACK = 120.0
 """chi square that a smooth field gains where nothing is hidden, beyond simulated nulls: the simulator's error."""
 SECOND = 0.2

@@ -44,6 +44,8 @@ class Clip:
     """First frame that is not fitted."""
     normal: np.ndarray
     """Out of the base towards the observed side, (3,)."""
+    device: str = "cpu"
+    """Where the engine runs."""
 
     @property
     def frames(self) -> int:
@@ -73,7 +75,7 @@ class Clip:
         falls = self.recording.starts == "released" and self.recording.gravity is not None
         return prepare(
             self.body, terms, density=self.density, carried=self.rest, grips=grips if len(grips.radius) else None,
-            threads=threads, gravity=self.recording.gravity if falls else (0.0, 0.0, 0.0),
+            threads=threads, device=self.device, gravity=self.recording.gravity if falls else (0.0, 0.0, 0.0),
         )  # fmt: skip
 
     def quiet(self) -> np.ndarray:
@@ -114,7 +116,7 @@ def speed_of(motion: Motion, fps: float, frames: int) -> np.ndarray:
     return np.where(motion.active, speed, 0.0).max(0)
 
 
-def clip_of(recording: Recording, *, share: float = SHARE) -> Clip:
+def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") -> Clip:
     """Lay a grid through the body, choose points and frames.
 
     share: spacing of the grid over the cube root of the body's volume. Raises Problem where fewer than 4 points
@@ -145,7 +147,7 @@ def clip_of(recording: Recording, *, share: float = SHARE) -> Clip:
     seen = recording.visible[kept].copy()
     moved = recording.points[kept].astype(float) - rest[kept][:, None]
     moved = np.where(seen[..., None], moved, 0.0)
-    return Clip(recording, body, kept, rest[kept], seen, moved, until, _normal(body, rest[kept]))
+    return Clip(recording, body, kept, rest[kept], seen, moved, until, _normal(body, rest[kept]), device)
 
 
 def fitted_until(recording: Recording) -> int:

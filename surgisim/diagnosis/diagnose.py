@@ -37,6 +37,8 @@ class Refit:
     """What it adds to the base at this amplitude over the whole clip [m], (K, T, 3)."""
     gain: float
     log_evidence: float
+    x: np.ndarray | None = None
+    """The base that was fitted with it, (3,); None where the base stayed."""
 
     @property
     def term(self) -> str:
@@ -66,7 +68,7 @@ def diagnose(
     recording: Recording, settings: Diagnosing, progress: Progress, memo: Memo
 ) -> tuple[Diagnosis, Physics, Mismatch]:
     """What the recording's simulation lacks. Raises Problem where the recording cannot be used."""
-    clip = clip_of(recording, share=settings.grid)
+    clip = clip_of(recording, share=settings.grid, device=settings.device)
     progress(0.01, 1, f"noise of {len(clip.kept)} points on {clip.until} frames")
     case = prepare_case(clip, settings, memo, progress)
     findings = search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.4 * s, 1, text))
@@ -93,9 +95,11 @@ def diagnose(
                 # What the engine does not confirm gives way to what the tangent puts next.
                 waiting = rest[:1]
         refits.sort(key=lambda r: -r.log_evidence)
-        for n, one in enumerate(refits[: settings.free]):
-            done = 0.75 + 0.1 * n / settings.free
-            refits[n] = freed(case, one, case.z, lambda text, done=done: progress(done, 1, text))
+        close = [r for r in refits if r.gain > calibration.CLOSE * refits[0].gain][: settings.free]
+        for n, one in enumerate(close):
+            done = 0.75 + 0.1 * n / len(close)
+            better = freed(case, one, case.z, lambda text, done=done: progress(done, 1, text))
+            refits = [better if r is one else r for r in refits]
         refits.sort(key=lambda r: -r.log_evidence)
     second = None
     if detected and settings.second and refits[0].gain < calibration.EXPLAINED_WELL * verdict.explainable(bend):
@@ -185,13 +189,12 @@ def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: 
 
 def freed(case: Case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
     """The same law with everything about it free; as it was where that gains nothing."""
-    start = one.finding.hypothesis, one.amplitude
-    found = refined(case.clip, case.base, case.whiten, case.space, case.memo, z, start, say)
+    found = refined(case, z, (one.finding.hypothesis, one.amplitude), one.response, say)
     if found is None or found.gain <= one.gain:
         return one
     finding = replace(one.finding, hypothesis=found.hypothesis, spread=found.spread)
-    better = {"finding": finding, "amplitude": found.amplitude, "response": found.response, "gain": found.gain}
-    return replace(one, **better, log_evidence=one.log_evidence + 0.5 * (found.gain - one.gain))
+    evidence = one.log_evidence + 0.5 * (found.gain - one.gain)
+    return Refit(finding, found.amplitude, found.response, found.gain, evidence, found.x)
 
 
 def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:

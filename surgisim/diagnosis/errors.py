@@ -4,15 +4,31 @@ import numpy as np
 
 from surgisim.diagnosis.flexible import smooth_part
 
+LEAST = 3
+"""Frames of rest that a point's constant is told from; seen in fewer, it is told from all that may be fitted."""
 
-def residual(case, simulated, nan: bool = True) -> np.ndarray:
-    """Recording less prediction less each point's own constant [m], (K, T, 3)."""
-    clip, until = case.clip, case.clip.until
+
+def residual(case, simulated, nan: bool = True, rest_only: bool = True) -> np.ndarray:
+    """Recording less prediction less each point's own constant [m], (K, T, 3).
+
+    The constant is the mean over the rest before the first grasp: over all fitted frames (`rest_only` False), where it
+    is known better, it takes with it what physics adds to all of them.
+    """
+    clip = case.clip
     left = np.where(clip.seen[..., None], clip.moved - simulated, 0.0)
     if case.settings.offsets:
-        count = np.maximum(clip.seen[:, :until].sum(1), 1)
-        left = left - (left[:, :until].sum(1) / count[:, None])[:, None]
+        held = clip.motion.active.any(0) if len(clip.motion.active) else np.zeros(clip.frames, bool)
+        rest, fitted = slice(0, int(held.argmax())), slice(0, clip.until)
+        (constant, count), (instead, _) = (_mean(left, clip.seen, span) for span in (rest, fitted))
+        resting = (count >= LEAST) & rest_only
+        left = left - np.where(resting[:, None], constant, instead)[:, None]
     return np.where(clip.seen[..., None], left, np.nan if nan else 0.0)
+
+
+def _mean(left: np.ndarray, seen: np.ndarray, span: slice) -> tuple[np.ndarray, np.ndarray]:
+    """Of every point over the frames in `span` in which it is seen, (K, 3), and how many those are, (K,)."""
+    count = seen[:, span].sum(1)
+    return left[:, span].sum(1) / np.maximum(count, 1)[:, None], count
 
 
 def rms(case, simulated) -> tuple[float, float | None]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.artifacts.motion import Motion
-from surgisim.diagnosis.base import SAFETY, Base, carried
+from surgisim.diagnosis.base import SAFETY, Base, boldly, carried
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.hypothesis import RISE, Hypothesis
 from surgisim.diagnosis.memo import Memo
@@ -14,6 +14,7 @@ from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Run
 from surgisim.physics.catalogue import choose
 from surgisim.physics.place import Place
+from surgisim.physics.terms.pretension import across_of
 
 SPHERE = 0.45
 """2 (4 - 5 nu) / 15 (1 - nu) near nu = .45."""
@@ -62,18 +63,42 @@ def law_of(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> Law:
         yaw, pitch = angles(h.about["axis"])
         return Law({term: {"k1": a, "k2": h.about["k2"], "yaw": yaw, "pitch": pitch}}, {})
     if term == "pretension":
-        return Law({term: _tension(amplitude, h.about["plane"])}, {})
+        return Law({term: {**_tension(amplitude, h.about["plane"]), "grows": h.about["grows"]}}, {})
     if term == "relaxation":
         return Law({term: {"G": a, "tau": h.about["tau"]}}, {})
     if term == "plastic_set":
         return Law({term: {"yield_strain": h.about["yield_strain"], "share": min(a, 1.0)}}, {})
     if term == "damage":
-        return Law({term: {"onset": h.about["onset"], "rate": a}}, {})
+        return Law({term: {"onset": h.about["onset"], "rate": a, "most": h.about["most"]}}, {})
     if term == "sliding_base":
         yaw, pitch = angles(clip.normal)
         own = {"share": 1.0, "stiffness": h.about["stiffness"], "yaw": yaw, "pitch": pitch}
         return Law({term: {**own, "cap": h.about["cap"] / max(a, 1e-3)}}, {})
     return Law({"active_contraction": {"tension": a, **_waves(h, clip)}}, {})
+
+
+FORCES = (
+    "hidden_contact",
+    "added_mass",
+    "tether",
+    "gravity",
+    "stiffening",
+    "fibre",
+    "pretension",
+    "relaxation",
+    "active_contraction",
+    "sliding_base",
+)
+"""Laws whose strength shows only over the tissue's own stiffness."""
+
+
+def beside(h: Hypothesis, amplitude: np.ndarray, stiffer: float) -> tuple[Hypothesis, np.ndarray]:
+    """The law that does the same in tissue `stiffer` times as stiff."""
+    if h.term not in FORCES:
+        return h, amplitude
+    if h.term == "sliding_base":
+        return replace(h, about={k: stiffer * v for k, v in h.about.items()}), amplitude
+    return h, stiffer * amplitude
 
 
 def _waves(h: Hypothesis, clip: Clip) -> dict[str, float]:
@@ -111,11 +136,17 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
     def make() -> dict[str, np.ndarray]:
         prepared = clip.prepared(tuple(values), motion=motion)
         theta = prepared.theta(values, law.places)
-        per_frame = steps(clip, base, prepared, theta)
-        drive = prepared.drive(motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames, places=law.places)
         first = int(law.begins * clip.fps)
         begin = None if first == 0 else base.run.state(first)[:2]
-        run = prepared.simulator.run(theta, drive, begin=begin, first=first, last=frames - 1)
+
+        def at(safety: float) -> Run:
+            per_frame = steps(clip, prepared, theta, safety)
+            drive = prepared.drive(
+                motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames, places=law.places
+            )
+            return prepared.simulator.run(theta, drive, begin=begin, first=first, last=frames - 1)
+
+        run = boldly(at)
         seen = carried(prepared.simulator.carry(clip.rest), Run(run.u, run.v, run.q))
         return {"seen": np.concatenate([base.simulated[:, :first], seen], 1).astype(np.float32)}
 
@@ -124,9 +155,9 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
     return memo(["law", base.x.tolist(), values, _plain(where), moved, law.begins, frames], make)["seen"].astype(float)
 
 
-def steps(clip: Clip, base: Base, prepared: Prepared, theta: np.ndarray) -> int:
-    """Stable steps a frame with the law."""
-    return max(prepared.per_frame_of(prepared.stiffest(theta), clip.fps, SAFETY), base.drive.per_frame)
+def steps(clip: Clip, prepared: Prepared, theta: np.ndarray, safety: float = SAFETY) -> int:
+    """Steps a frame with the laws of `theta`."""
+    return prepared.per_frame_of(prepared.stiffest(theta), clip.fps, safety)
 
 
 def angles(direction: np.ndarray) -> tuple[float, float]:
@@ -154,11 +185,15 @@ def _breath(parts: np.ndarray, rate: float) -> dict[str, float]:
 
 
 def _tension(amplitude: np.ndarray, plane: np.ndarray) -> dict[str, float]:
+    """From threads a third of a turn apart in a plane, (3,), to the tensions along its two main directions."""
     turns = np.arange(3) * np.pi / 3
     axes = np.stack([np.cos(turns), np.sin(turns)], 1)
     values, vectors = np.linalg.eigh(np.einsum("h,hi,hj->ij", amplitude, axes, axes))
-    yaw, pitch = angles(vectors[:, 1] @ plane)
-    return {"along": max(float(values[1]), 1e-6), "across": max(float(values[0]), 0.0), "yaw": yaw, "pitch": pitch}
+    a, b = vectors[:, 1] @ plane, vectors[:, 0] @ plane
+    yaw, pitch = angles(a)
+    right, down = across_of(yaw, pitch)
+    along, across = max(float(values[1]), 1e-6), max(float(values[0]), 0.0)
+    return {"along": along, "across": across, "yaw": yaw, "pitch": pitch, "roll": math.atan2(b @ down, b @ right)}
 
 
 def lag(h: Hypothesis, clip: Clip) -> np.ndarray:
@@ -181,20 +216,6 @@ def _slipped(clip: Clip, h: Hypothesis, amplitude: float) -> Motion:
     return replace(motion, position=position)
 
 
-FORCES = (
-    "hidden_contact",
-    "added_mass",
-    "tether",
-    "gravity",
-    "stiffening",
-    "fibre",
-    "pretension",
-    "relaxation",
-    "active_contraction",
-    "sliding_base",
-)
-
-
 def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Clip, base: Base) -> dict[str, dict]:
     """Parameters with 90 % intervals and units, as diagnosis.json has them."""
     law = law_of(h, amplitude, clip)
@@ -206,7 +227,6 @@ def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Cl
         "stiffening": "k", "fibre": "k1", "pretension": "along", "relaxation": "G", "plastic_set": "share",
         "damage": "rate", "active_contraction": "tension", "sliding_base": "cap",
     }  # fmt: skip
-    # What pushes, pulls or resists is told only over the tissue's own stiffness.
     by_stiffness = 1.645 * float(base.spread[0])
     for name, numbers in law.values.items():
         if name == "hidden_contact" and h.term == "added_mass":

@@ -18,6 +18,8 @@ from surgisim.physics.catalogue import choose
 TAUS = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 YIELDS = (0.05, 0.08, 0.12, 0.17, 0.24)
 TEARS = (0.05, 0.08, 0.12, 0.17, 0.24)
+MOST = 0.8
+"""Damage that is never exceeded, where a fit begins."""
 CAPS = (0.15, 0.35, 0.6)
 """Friction that a base is tried with, over the largest traction it bears."""
 SMALL = 1e-3
@@ -28,7 +30,7 @@ STEPS = 2
 FORMS = (
     *(("relaxation", {"G": 1.0, "tau": t}) for t in TAUS),
     *(("plastic_set", {"yield_strain": y, "share": SMALL}) for y in YIELDS),
-    *(("damage", {"onset": y, "rate": SMALL}) for y in TEARS),
+    *(("damage", {"onset": y, "rate": SMALL, "most": MOST}) for y in TEARS),
 )
 
 

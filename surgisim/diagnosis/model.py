@@ -1,5 +1,7 @@
 """The named law as numbers that a simulation can use."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from surgisim.artifacts.physics import Physics
@@ -8,6 +10,7 @@ from surgisim.physics.catalogue import choose
 
 
 def base_numbers(base) -> dict:
+    """E, nu and eta with 90 % intervals."""
     E, nu, lag = float(np.exp(base.x[0])), float(base.x[1]), float(np.exp(base.x[2]))
     s = 1.645 * base.spread
     return {
@@ -25,7 +28,8 @@ def base_numbers(base) -> dict:
 def physics(case, refits) -> Physics:
     """The base's laws and the named ones, with the grid and a stable step."""
     clip, base = case.clip, case.base
-    step = base.drive.step
+    if refits and refits[0].x is not None:
+        base = replace(base, x=refits[0].x)
     values, where, known = dict(base.values), {}, base_numbers(base)
     for r in refits:
         h, law = r.finding.hypothesis, law_of(r.finding.hypothesis, r.amplitude, clip)
@@ -37,9 +41,8 @@ def physics(case, refits) -> Physics:
             continue
         values |= own
         where |= law.places
-    if where or len(values) > len(base.values):
-        prepared = clip.prepared(tuple(values))
-        step = 1 / clip.fps / steps(clip, base, prepared, prepared.theta(values, where))
+    prepared = clip.prepared(tuple(values))
+    step = 1 / clip.fps / steps(clip, prepared, prepared.theta(values, where))
     places = {
         n: {
             "center": [float(c) for c in p.center],

@@ -1,36 +1,44 @@
 """A law fitted with everything about it free: how strong, where, how wide, when, how fast, along which direction.
 
-What the search found is the start. The engine itself runs at every trial (Levenberg-Marquardt, forward differences),
-so that what the tangent cannot show, a lump so stiff that it moves as one, counts; the base and the nuisances stay free
-through the metric. Each number has a prior around its start, as wide as the search was coarse.
+What the search found is the start. The engine itself runs at every trial (Levenberg-Marquardt; forward differences at
+first, then Broyden's secants), so that what the tangent cannot show, a lump so stiff that it moves as one, counts. The
+base's E, nu and eta are free in the same runs, because a base fitted without the law has made up for it; the other
+nuisances stay free through the metric. Each number has a prior around its start, as wide as the search was coarse.
+
+Broyden, A class of methods for solving nonlinear simultaneous equations, Mathematics of Computation 19 (1965).
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import cho_solve
 
-from surgisim.diagnosis.base import Base
+from surgisim.diagnosis.base import HIGH, LOW, SPREAD, START, Base, carried, simulate
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import APART, scale
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import law_of, respond
-from surgisim.diagnosis.memo import Memo
-from surgisim.diagnosis.metric import Metric
-from surgisim.diagnosis.noise import Whitener
+from surgisim.diagnosis.laws import Law, beside, law_of, respond
+from surgisim.diagnosis.metric import metric
 from surgisim.estimation.trial import at_once
 from surgisim.mpm.simulator import Breakdown
 from surgisim.physics.place import Misplaced
 
 LOGARITHMS = {
-    "tau": 0.7, "yield_strain": 0.4, "onset": 0.4, "k2": 0.6, "rate": 0.15, "period": 0.15, "wavelength": 0.4,
+    "tau": 0.7, "yield_strain": 0.4, "onset": 0.4, "k2": 0.6, "rate": 0.15, "most": 0.5, "period": 0.15,
+    "wavelength": 0.4,
 }  # fmt: skip
 """Numbers of a form that are searched by their logarithm, and how far they may be off."""
-EXTENT, MOMENT, TURN, PHASE, SLACK = 0.5, 0.12, 0.25, 0.7, 5e-4
-"""How far an extent (logarithm), a moment [s], a direction [rad], a phase [rad] and a slack [m] may be off."""
+EXTENT, MOMENT, TURN, PHASE, GROWS, SLACK = 0.5, 0.12, 0.25, 0.7, 0.7, 5e-4
+"""How far an extent (logarithm), a moment [s], a direction [rad], a phase [rad], the exponent of a tension [1] and a
+slack [m] may be off."""
 STEP = 0.3
 """Of the forward differences, in prior standard deviations."""
-ROUNDS = 3
+ROUNDS, FRESH = 8, 2
+"""Steps at most, and how often the differences are taken afresh."""
+DONE, LITTLE, FAR = 0.004, 3.0, 0.15
+"""Share of the whole gain, and chi square, below which a step is the last; share beyond which the next one takes
+differences afresh."""
 
 
 @dataclass(frozen=True)
@@ -39,79 +47,119 @@ class Refined:
     amplitude: np.ndarray
     spread: np.ndarray
     """Posterior standard deviation of the amplitude."""
+    x: np.ndarray
+    """The base that goes with it, (3,)."""
     response: np.ndarray
-    """What the law adds to the base over the whole clip [m], (K, T, 3)."""
+    """What the law and its own base add to the base over the whole clip [m], (K, T, 3)."""
     gain: float
     """Of twice the log posterior over nothing."""
 
 
 def refined(
-    clip: Clip, base: Base, whiten: Whitener, space: Metric, memo: Memo, z: np.ndarray,
-    start: tuple[Hypothesis, np.ndarray], say: Callable[[str], None],
-) -> Refined | None:  # fmt: skip
-    """The best law near `start`, a hypothesis and its amplitude (H,); z: whitened residual of the base, (N,).
+    case, z: np.ndarray, start: tuple[Hypothesis, np.ndarray], response: np.ndarray, say: Callable[[str], None]
+) -> Refined | None:
+    """The best law near `start`, a hypothesis and its amplitude (H,), whose response [m], (K, T, 3), is known.
 
-    None where the engine breaks down at the start itself.
+    case: a `diagnose.Case`; z: whitened residual of the base, (N,). None where the engine breaks down at the start.
     """
     h, amplitude = start
-    knobs = _knobs(h, amplitude, clip)
-    until = clip.until
+    clip, base, whiten, until = case.clip, case.base, case.whiten, case.clip.until
+    workers = case.settings.workers if clip.device == "cpu" else 1
+    own = _knobs(h, amplitude, clip)
+    # The base is searched by the engine: its slopes leave the metric.
+    space = metric(np.delete(case.space.columns, case.slopes, axis=1))
 
-    def change(x: np.ndarray) -> np.ndarray | None:
+    def turned(x: np.ndarray) -> tuple[Hypothesis, np.ndarray, np.ndarray]:
+        there = _base_at(base, x[len(own) :])
+        # Only what pushes or resists over the tissue's own stiffness shows.
+        return *beside(*_turned(h, amplitude, own, x[: len(own)], clip), float(np.exp(there[0] - base.x[0]))), there
+
+    def law_at(x: np.ndarray) -> tuple[Law, np.ndarray]:
+        *law, there = turned(x)
+        return law_of(*law, clip), there
+
+    def left(x: np.ndarray, _worker: int = 0) -> np.ndarray | None:
         try:
-            law = law_of(*_turned(h, amplitude, knobs, x, clip), clip)
-            return respond(clip, base, law, memo, until) - base.simulated[:, :until]
+            law, there = law_at(x)
+            moved = respond(clip, _moved(case, there, law.begins), law, case.memo, until)
         except (Breakdown, Misplaced):
             # A place outside the body, or tissue torn apart: not a law of this clip.
             return None
-
-    def left(x: np.ndarray, _worker: int = 0) -> np.ndarray | None:
-        moved = change(x)
-        return None if moved is None else z - whiten(moved)
+        return z - whiten(moved - base.simulated[:, :until])
 
     def cost(x: np.ndarray, r: np.ndarray | None) -> float:
         return np.inf if r is None else float(space.gram(r[:, None], r[:, None])[0, 0] + x @ x)
 
-    x = np.zeros(len(knobs))
-    r = left(x)
+    likely = cho_solve(case.space.factor, case.space.seen_through(z - whiten(response[:, :until])))[case.slopes]
+    usual = (np.array([START[0], base.x[1], START[2]]) - base.x) / SPREAD
+    begins = [np.concatenate([np.zeros(len(own)), by]) for by in (0 * usual, np.clip(likely, -2, 2), usual)]
+    say(f"{h.term} with all its numbers free")
+    residuals = at_once(left, begins, workers)
+    k = int(np.argmin([cost(x, r) for x, r in zip(begins, residuals, strict=True)]))
+    x, r = begins[k], residuals[k]
     if r is None:
         return None
-    nothing, best, damping = cost(0 * x, z), cost(x, r), 0.1
-    normal = np.eye(len(x))
+    nothing, best, damping = float(case.space.gram(z[:, None], z[:, None])[0, 0]), cost(x, r), 0.1
+    J, fresh, normal = None, 0, np.eye(len(x))
     for n in range(ROUNDS):
-        say(f"{h.term} with all its numbers free, round {n + 1} of {ROUNDS}")
-        sides = at_once(left, [x + STEP * e for e in np.eye(len(x))])
-        J = np.stack([np.zeros_like(r) if s is None else (r - s) / STEP for s in sides], 1)
+        say(f"{h.term} with all its numbers free, round {n + 1} of at most {ROUNDS}")
+        if J is None:
+            sides = at_once(left, [x + STEP * e for e in np.eye(len(x))], workers)
+            J = np.stack([np.zeros_like(r) if s is None else (r - s) / STEP for s in sides], 1)
+            fresh += 1
         normal = space.gram(J, J) + np.eye(len(x))
         pull = space.gram(J, r[:, None])[:, 0] - x
-        trials = [
-            x + np.clip(np.linalg.solve(normal + f * damping * np.diag(np.diag(normal)), pull), -1.5, 1.5)
+        steps = [
+            np.clip(np.linalg.solve(normal + f * damping * np.diag(np.diag(normal)), pull), -1.5, 1.5)
             for f in (0.1, 3.0)
         ]
-        results = at_once(left, trials)
-        costs = [cost(t, s) for t, s in zip(trials, results, strict=True)]
+        results = at_once(left, [x + s for s in steps], workers)
+        for step, result in zip(steps, results, strict=True):
+            if result is not None:
+                J = J + np.outer((r - result) - J @ step, step) / max(step @ step, 1e-12)
+        costs = [cost(x + s, result) for s, result in zip(steps, results, strict=True)]
         k = int(np.argmin(costs))
-        if costs[k] >= best:
+        won = (best - costs[k]) / max(nothing - min(costs[k], best), 1.0)
+        if costs[k] < best:
+            x, r, best, damping = x + steps[k], results[k], costs[k], damping * (0.1, 3.0)[k]
+        else:
             damping *= 10
-            continue
-        done = best - costs[k] < 0.02 * max(nothing - costs[k], 1.0)
-        x, r, best, damping = trials[k], results[k], costs[k], damping * (0.1, 3.0)[k]
-        if done:
+        if won < max(DONE, LITTLE / max(nothing - best, 1.0)) and (won > 0 or n > 0):
             break
-    turned, strength = _turned(h, amplitude, knobs, x, clip)
+        if won > FAR and fresh < FRESH:
+            J = None
+    law, there = law_at(x)
     try:
-        response = respond(clip, base, law_of(turned, strength, clip), memo) - base.simulated
+        response = respond(clip, _moved(case, there, law.begins), law, case.memo) - base.simulated
     except Breakdown:
         return None
-    sd = np.sqrt(np.diag(np.linalg.inv(normal)))
-    off = [_turned(h, amplitude, knobs, x + side, clip)[1] - strength for side in np.diag(sd)]
-    return Refined(turned, strength, np.sqrt(np.sum(np.square(off), 0)), response, nothing - best)
+    found, strength, _ = turned(x)
+    sd = np.sqrt(np.diag(np.linalg.inv(normal)))[: len(own)]
+    off = [turned(x + np.append(side, np.zeros(3)))[1] - strength for side in np.diag(sd)]
+    return Refined(found, strength, np.sqrt(np.sum(np.square(off), 0)), there, response, nothing - best)
+
+
+def _base_at(base: Base, by: np.ndarray) -> np.ndarray:
+    """The base's numbers moved by prior standard deviations, (3,)."""
+    return np.clip(base.x + by * SPREAD, LOW, HIGH)
+
+
+def _moved(case, x: np.ndarray, begins: float) -> Base:
+    """The base at other numbers; with its own run up to where a law begins [s], if it begins late."""
+    base, first = case.base, int(begins * case.clip.fps)
+    if np.array_equal(x, base.x):
+        return base
+    if first == 0:
+        return replace(base, x=x)
+    _, run = simulate(base.prepared, case.clip, x, case.memo, first + 1)
+    return replace(base, x=x, run=run, simulated=carried(base.prepared.simulator.carry(case.clip.rest), run))
 
 
 def _knobs(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> list[tuple[str, object, float]]:
     """What may be turned: kind, which, and its prior standard deviation."""
     size = float(np.linalg.norm(amplitude)) or 1.0
-    if h.sign and len(amplitude) == 1:
+    if (h.sign and len(amplitude) == 1) or h.term == "respiration":
+        # A base's motion enters linearly: its direction and course stay as the search found them.
         knobs = [("strength", 0, 1.0)]
     else:
         knobs = [("amplitude", k, size) for k in range(len(amplitude))]
@@ -131,6 +179,8 @@ def _knobs(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> list[tuple[str, 
         knobs.append(("turn", "axis", TURN))
     if "phase" in h.about:
         knobs.append(("plus", "phase", PHASE))
+    if "grows" in h.about:
+        knobs.append(("grows", "grows", GROWS))
     if "slack" in h.about:
         knobs.append(("slack", "slack", SLACK))
     return knobs
@@ -142,7 +192,7 @@ def _turned(h: Hypothesis, amplitude: np.ndarray, knobs, x: np.ndarray, clip: Cl
     moments = {"onset": h.onset, "end": h.end}
     for (kind, which, _), by in zip(knobs, x * np.array([k[2] for k in knobs]), strict=True):
         if kind == "strength":
-            amplitude[0] *= np.exp(by)
+            amplitude *= np.exp(by)
         elif kind == "amplitude":
             amplitude[which] += by
         elif kind == "center":
@@ -155,11 +205,15 @@ def _turned(h: Hypothesis, amplitude: np.ndarray, knobs, x: np.ndarray, clip: Cl
             moments[kind] = max(moments[kind] + by, 0.0)
         elif kind == "logarithm":
             about[which] *= float(np.exp(by))
+            if which == "most":
+                about[which] = min(about[which], 1.0)
         elif kind == "turn":
             axis, n = np.asarray(about[which]), clip.normal
             about[which] = np.cos(by) * axis + np.sin(by) * np.cross(n, axis)
         elif kind == "plus":
             about[which] += by
+        elif kind == "grows":
+            about[which] = float(np.clip(about[which] + by, -1.0, 1.0))
         elif kind == "slack":
             about[which] = max(about[which] + by, 0.0)
     return replace(h, place=place, about=about, **moments), amplitude

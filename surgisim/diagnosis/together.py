@@ -19,9 +19,13 @@ def together(case, refits) -> np.ndarray:
     """
     clip, base, until = case.clip, case.base, case.clip.until
     plain = base.simulated + sum(r.response for r in refits)
+    first = refits[0].x
+    if len(refits) == 1 and first is not None:
+        # Law and base were fitted in the same runs.
+        return plain
     left = case.z - sum(case.whiten(r.response[:, :until]) for r in refits)
     likely = cho_solve(case.space.factor, case.space.seen_through(left))[case.slopes]
-    x = np.clip(base.x + likely * SPREAD, LOW, HIGH)
+    x = np.clip((base.x if first is None else first) + likely * SPREAD, LOW, HIGH)
     try:
         drive, run = simulate(base.prepared, clip, x, case.memo, clip.frames)
         simulated = carried(base.prepared.simulator.carry(clip.rest), run)

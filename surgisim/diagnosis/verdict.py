@@ -10,11 +10,12 @@ from surgisim.diagnosis import calibration, words
 from surgisim.diagnosis.clip import PHASES
 from surgisim.diagnosis.errors import errors, residual, rms
 from surgisim.diagnosis.experiment import separating
+from surgisim.diagnosis.flexible import flexible
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import described, law_of, respond
 from surgisim.diagnosis.locate import cause, of_places, symptom
 from surgisim.diagnosis.model import base_numbers, physics
-from surgisim.diagnosis.noise import estimate
+from surgisim.diagnosis.noise import Noise, estimate
 from surgisim.diagnosis.together import together
 from surgisim.mpm.simulator import Breakdown
 
@@ -30,7 +31,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
     total = max(explainable(bend), max([r.gain for r in refits], default=0.0), 1e-9)
     after = base.simulated.copy()
     effects, accepted, explained = [], [], 0.0
-    verdict, alike = "nothing detectable", []
+    verdict, alike, shares = "nothing detectable", [], {}
     if detected:
         first = refits[0]
         explained = first.gain / total
@@ -41,25 +42,23 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
             accepted.append(second[0])
             explained = min((first.gain + second[0].gain) / total, 1.0)
         alike = [r for r in refits[1:] if _cos(case, first, r) > calibration.ALIKE and chances[r.term] > 0.1]
+        after = together(case, accepted)
+        gained, took, left = explained, taken(case, after), still(case, bend, after)
+        explained = max(gained, took)
+        shares = {"gained": float(gained), "taken": took, "left": left}
         verdict = "named"
         if explained < calibration.EXPLAINED or first.log_evidence < calibration.THRESHOLD:
             verdict = "unexplained"
         elif alike and chances[first.term] < calibration.SURE:
             verdict = "equivalence class"
-        after = together(case, accepted)
         effects = [_effect(case, r, chances, laws, refits, n) for n, r in enumerate(accepted)]
         if verdict == "unexplained":
             for effect in effects:
                 effect["probability"] = min(effect["probability"], float(np.clip(explained / 2, 0.0, 0.5)))
     placebo = _placebo(case, refits, laws, rng) if detected else None
-    # With the effect taken off, quiet frames show the noise alone.
-    quiet = slice(0, clip.until)
-    noise = estimate(
-        residual(case, after, False)[:, quiet], clip.seen[:, quiet], clip.rest, clip.quiet()[quiet],
-        clip.recording.sigma[clip.kept],
-    )  # fmt: skip
+    noise = noise_beside(case, after)
     fit, held_out = errors(case, after, placebo, noise.sigma)
-    z, reach = symptom(clip, noise, residual(case, base.simulated, False), rng)
+    z, reach = symptom(clip, noise, residual(case, base.simulated, False, rest_only=False), rng)
     freed = case.z - case.space.explained(case.z)
     cleared = case.nulls - case.space.explained(case.nulls)
     heat, when = cause(base, case.whiten, freed, cleared)
@@ -91,6 +90,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
             "log_evidence": float(laws[ranked[0]][0]),
             "nulls": np.round(np.max([n for _, n, _ in laws.values()], 0), 3).tolist(),
             "explainable": float(explainable(bend)),
+            **shares,
         },
     )
     mismatch = Mismatch(
@@ -105,6 +105,29 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         phase=clip.phases(),
     )
     return diagnosis, physics(case, accepted if verdict in ("named", "equivalence class") else []), mismatch
+
+
+def noise_beside(case, after: np.ndarray) -> Noise:
+    """The noise with an effect taken off: then quiet frames show it alone."""
+    clip, quiet = case.clip, slice(0, case.clip.until)
+    return estimate(
+        residual(case, after, False)[:, quiet], clip.seen[:, quiet], clip.rest, clip.quiet()[quiet],
+        clip.recording.sigma[clip.kept],
+    )  # fmt: skip
+
+
+def taken(case, after: np.ndarray) -> float:
+    """Share of the misfit's mean square beyond the noise that a prediction takes away on fitted frames."""
+    least = 3e6 * noise_beside(case, after).sigma ** 2
+    before, left = (rms(case, s)[0] ** 2 - least for s in (case.base.simulated, after))
+    return float(np.clip(1 - left / before, 0, 1)) if before > 0 else 0.0
+
+
+def still(case, bend, after: np.ndarray) -> float:
+    """Share of what a smooth field could explain that is left beside a prediction."""
+    clip = case.clip
+    z = case.z - case.whiten(after[:, : clip.until] - case.base.simulated[:, : clip.until])
+    return explainable(flexible(clip, case.whiten, case.space, z, case.nulls)) / max(explainable(bend), 1e-9)
 
 
 def explainable(bend) -> float:
@@ -201,7 +224,7 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
                 "probability": chances[term],
                 "gain": float(f.gain if r is None else r.gain),
                 "cos": None if r is None else _cos(case, refits[0], r),
-                "held_out": held,
+                "held_out_rms": held,
                 "onset": f.hypothesis.onset,
                 "refitted": r is not None,
             }

@@ -13,6 +13,9 @@ from surgisim.diagnosis.tangent import piola
 from surgisim.physics.catalogue import choose
 
 ANGLES = 12
+GROWS = (-1.0, 1.0)
+"""How the tension of a pretension goes with stretch."""
+AXES = ("ax", "ay", "az", "bx", "by", "bz")
 PERIODS = (0.8, 1.0, 1.25, 1.6, 2.0)
 WAVES = (0.024, 0.045)
 PHASES = tuple(np.arange(6) * 2 * np.pi / 6)
@@ -83,12 +86,19 @@ def everywhere(clip: Clip, base: Base) -> Block:
     columns, found = [], []
     columns.append(_by_states(base, lambda F: piola(laws["stiffening"], F, {"k": 1.0})))
     found.append(("stiffening", [0], 1, {}))
-    first = len(columns)
-    for turn in (0.0, np.pi / 3, 2 * np.pi / 3):
-        a = np.cos(turn) * u + np.sin(turn) * v
-        row = {"along": 1.0, "across": 0.0, "x": a[0], "y": a[1], "z": a[2]}
-        columns.append(_by_states(base, lambda F, r=row: piola(laws["pretension"], F, r)))
-    found.append(("pretension", [first, first + 1, first + 2], 0, {"plane": np.stack([u, v])}))
+    for grows in GROWS:
+        first = len(columns)
+        for turn in (0.0, np.pi / 3, 2 * np.pi / 3):
+            a = np.cos(turn) * u + np.sin(turn) * v
+            row = {
+                "along": 1.0,
+                "across": 0.0,
+                "grows": grows,
+                **dict(zip(AXES, (*a, *np.cross(a, clip.normal)), strict=True)),
+            }
+            columns.append(_by_states(base, lambda F, r=row: piola(laws["pretension"], F, r)))
+        about = {"plane": np.stack([u, v]), "grows": grows}
+        found.append(("pretension", [first, first + 1, first + 2], 0, about))
     eye = np.eye(len(columns))
     return Block(np.stack(columns), [Hypothesis(t, eye[:, k], s, None, None, None, a) for t, k, s, a in found])
 

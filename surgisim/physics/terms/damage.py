@@ -1,9 +1,9 @@
 """Damage: tissue that was stretched too far is softer from then on.
 
-    factor = exp(-rate <k - onset>),   k = the largest |e| so far,   e = dev (C - I) (C + I)^-1
+    factor = 1 - most (1 - exp(-rate <k - onset>)),   k = the largest |e| so far,   e = dev (C - I) (C + I)^-1
 
 |e| is von Mises' equivalent strain and `onset` the strain from which damage begins. The factor multiplies the stress
-of every law that stores energy; the damage 1 - factor never heals and never reaches one. With psi that energy, the
+of every law that stores energy; the damage 1 - factor never heals and never reaches `most`. With psi that energy, the
 power lost is -d(factor)/dt psi >= 0. k does not depend on `rate`, so the misfit's slope at rate = 0 already tells
 whether and where damage pays. <x> = x^3 / (x^2 + .02^2) for x > 0; one kink remains, where a load turns, as in
 everything that keeps its largest value.
@@ -25,7 +25,8 @@ SOFT = 0.02
 
 @wp.func
 def factor(F: Any, q: Any, theta: Any):
-    return wp.exp(-theta[1] * ramp(q[0] - theta[0], F.dtype(SOFT)))
+    one = F.dtype(1.0)
+    return one - theta[2] * (one - wp.exp(-theta[1] * ramp(q[0] - theta[0], F.dtype(SOFT))))
 
 
 @wp.func
@@ -33,11 +34,11 @@ def advance(F: Any, D: Any, R: Any, u: Any, q: Any, theta: Any, dt: Any):
     return wp.vector(wp.max(q[0], size(strain(F))), length=1, dtype=F.dtype)
 
 
-def twin(F, q, onset, rate):
-    return np.exp(-rate * twin_ramp(q[..., 0] - onset, SOFT))
+def twin(F, q, onset, rate, most):
+    return 1 + most * np.expm1(-rate * twin_ramp(q[..., 0] - onset, SOFT))
 
 
-def twin_advance(F, D, u, q, dt, onset, rate):
+def twin_advance(F, D, u, q, dt, onset, rate, most):
     return np.maximum(q, twin_size(twin_strain(F))[..., None])
 
 
@@ -50,5 +51,6 @@ TERM = Term(
     params={
         "onset": Param("1", low=0.02, high=1.0, default=0.15),
         "rate": Param("1", low=0.1, high=2e1, default=2.0, off=0.0),
+        "most": Param("1", low=0.05, high=1.0, default=1.0, logarithmic=False),
     },
 )
