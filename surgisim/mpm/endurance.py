@@ -10,6 +10,7 @@ law dissipates: once the tissue is let go, its energy may only fall.
 import argparse
 import json
 import math
+import sys
 import time
 from collections.abc import Callable
 
@@ -23,6 +24,7 @@ from surgisim.artifacts.motion import Motion
 from surgisim.mpm.benchmark import VALUES, block
 from surgisim.mpm.setup import Prepared, prepare
 from surgisim.physics.catalogue import choose
+from surgisim.problem import Problem
 
 SECONDS, FPS, SHARE = 8.0, 25.0, 0.4
 """How long [s], frames a second, and how far the pull goes, as a share of the block's thickness."""
@@ -42,13 +44,15 @@ def operation(motion: Motion, thickness: float) -> Motion:
 
 
 def endure(device: str, particles: int, grid: int, steps: int) -> dict:
-    """Energies [J] and momentum [kg m/s] over time, and how long a step took. Raises Breakdown."""
+    """Energies [J] and momentum [kg m/s] over time, and how long a step took. Raises Problem."""
     body, motion = block(particles, grid)
     made = prepare(body, tuple(VALUES), density=1050.0, device=device)
     per_frame = math.ceil(steps / (SECONDS * FPS))
     least = made.per_frame(VALUES, FPS)
     if per_frame < least:
-        raise SystemExit(f"{steps} steps in {SECONDS:g} s are not stable; at least {round(least * SECONDS * FPS)} are.")
+        raise Problem(
+            f"--steps: {steps} steps in {SECONDS:g} s are not stable; ask for at least {round(least * SECONDS * FPS)}."
+        )
     path = made.drive(operation(motion, float(np.ptp(body.rest[:, 2]))), VALUES, fps=FPS, per_frame=per_frame)
     theta, mass, stored_in = made.theta(VALUES), made.simulator.mass.numpy().astype(float), _stored(made)
     at, kinetic, stored, momentum, farthest, spent = [], [], [], [], [], 0.0
@@ -115,7 +119,7 @@ def draw(result: dict) -> Figure:
     return figure
 
 
-def main() -> None:
+def main() -> int:
     cli = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     cli.add_argument("--device", choices=["cpu", "cuda"], default="cpu")
     cli.add_argument("--particles", type=int, default=100_000)
@@ -123,11 +127,16 @@ def main() -> None:
     cli.add_argument("--steps", type=int, default=80_000, help="in 8 s")
     cli.add_argument("--picture", help="where to draw the log, a PNG")
     arguments = cli.parse_args()
-    result = endure(arguments.device, arguments.particles, arguments.grid, arguments.steps)
+    try:
+        result = endure(arguments.device, arguments.particles, arguments.grid, arguments.steps)
+    except Problem as problem:
+        print(problem, file=sys.stderr)
+        return 2
     if arguments.picture:
         draw(result).savefig(arguments.picture, dpi=110)
     print(json.dumps(result))
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
