@@ -16,7 +16,7 @@ BASE = {
     "newtonian": {"eta": 1.0},
     "relaxation": {"G": 0.0, "tau": 0.2},
     "plastic_set": {"yield_strain": 0.1, "share": 0.0},
-    "damage": {"onset": 0.1, "rate": 0.0},
+    "damage": {"onset": 0.1, "rate": 0.0, "most": 1.0},
 }
 
 
