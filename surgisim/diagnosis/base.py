@@ -24,9 +24,7 @@ TERMS = ("neo_hookean_ciarlet", "newtonian")
 START = np.array([np.log(3e3), 0.45, np.log(3e-3)])
 """log E [Pa], nu, log eta / E [s]."""
 SPREAD = np.array([0.8, 0.03, 0.8])
-LOW, HIGH = np.array([np.log(5e2), 0.30, np.log(3e-4)]), np.array([np.log(5e4), 0.485, np.log(1.2e-2)])
-"""What is slower than 12 ms is no base's viscosity but something to be named (and an explicit step would follow it in
-microseconds)."""
+LOW, HIGH = np.array([np.log(5e2), 0.30, np.log(3e-4)]), np.array([np.log(5e4), 0.485, np.log(3e-2)])
 STEP = np.array([0.2, 0.01, 0.3])
 SCAN = (-1.0, -0.35, 0.3, 1.0)
 """Where the descent may start, in logarithms of E and of eta / E away from START."""
