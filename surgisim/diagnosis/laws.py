@@ -13,8 +13,8 @@ from surgisim.diagnosis.memo import Memo
 from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Run
 from surgisim.physics.catalogue import choose
+from surgisim.physics.heading import across_of
 from surgisim.physics.place import Place
-from surgisim.physics.terms.pretension import across_of
 
 SPHERE = 0.45
 """2 (4 - 5 nu) / 15 (1 - nu) near nu = .45."""

@@ -43,7 +43,8 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
             explained = min((first.gain + second[0].gain) / total, 1.0)
         alike = [r for r in refits[1:] if _cos(case, first, r) > calibration.ALIKE and chances[r.term] > 0.1]
         after = together(case, accepted)
-        gained, took, left = explained, taken(case, after), still(case, bend, after)
+        noise = noise_beside(case, after)
+        gained, took, left = explained, taken(case, after, noise.sigma), still(case, bend, after)
         explained = max(gained, took)
         shares = {"gained": float(gained), "taken": took, "left": left}
         verdict = "named"
@@ -55,8 +56,9 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         if verdict == "unexplained":
             for effect in effects:
                 effect["probability"] = min(effect["probability"], float(np.clip(explained / 2, 0.0, 0.5)))
+    else:
+        noise = noise_beside(case, after)
     placebo = _placebo(case, refits, laws, rng) if detected else None
-    noise = noise_beside(case, after)
     fit, held_out = errors(case, after, placebo, noise.sigma)
     z, reach = symptom(clip, noise, residual(case, base.simulated, False, rest_only=False), rng)
     freed = case.z - case.space.explained(case.z)
@@ -116,9 +118,9 @@ def noise_beside(case, after: np.ndarray) -> Noise:
     )  # fmt: skip
 
 
-def taken(case, after: np.ndarray) -> float:
+def taken(case, after: np.ndarray, sigma: float) -> float:
     """Share of the misfit's mean square beyond the noise that a prediction takes away on fitted frames."""
-    least = 3e6 * noise_beside(case, after).sigma ** 2
+    least = 3e6 * sigma**2
     before, left = (rms(case, s)[0] ** 2 - least for s in (case.base.simulated, after))
     return float(np.clip(1 - left / before, 0, 1)) if before > 0 else 0.0
 

@@ -20,7 +20,7 @@ import numpy as np
 import warp as wp
 
 from surgisim.physics.catalogue import Param, Term
-from surgisim.physics.heading import PITCH, YAW, heading
+from surgisim.physics.heading import PITCH, YAW, across_of, heading
 
 
 @wp.func
@@ -60,12 +60,6 @@ def columns(along, across, grows, yaw, pitch, roll):
         "along": along, "across": across, "grows": grows, "ax": a[0], "ay": a[1], "az": a[2],
         "bx": b[0], "by": b[1], "bz": b[2],
     }  # fmt: skip
-
-
-def across_of(yaw: float, pitch: float) -> tuple[np.ndarray, np.ndarray]:
-    """The right of a heading, and what is at right angles to both, (3,) each."""
-    right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
-    return right, np.cross(heading(yaw, pitch), right)
 
 
 TERM = Term(
