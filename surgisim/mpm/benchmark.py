@@ -1,6 +1,6 @@
 """How long a step takes, forward and back, as JSON.
 
-    python -m surgisim.mpm.benchmark --device cuda --particles 100000 --grid 50
+    python -m surgisim.mpm.benchmark --device cuda --particles 100000 --grid 50 --json
 
 A block of tissue, fixed corotated and viscous, is pulled at its face. On a CPU, `plain` is a plain Warp step of the
 updated form (scatter, nodes, gather) on one thread, in the same run. Times are the best of a few bursts, so that other
@@ -122,12 +122,21 @@ def main() -> None:
     cli.add_argument("--grid", type=int, default=50, help="cells along the longest side")
     cli.add_argument("--threads", type=int, nargs="+", default=[1, 2], help="on a CPU")
     cli.add_argument("--bursts", type=int, default=3)
+    cli.add_argument("--json", action="store_true", help="print JSON and not a line a row")
     arguments = cli.parse_args()
     threads = arguments.threads if arguments.device == "cpu" else [1]
     rows = [
         measure(arguments.device, n, arguments.grid, arguments.bursts, t) for n in arguments.particles for t in threads
     ]
-    print(json.dumps(rows, indent=1))
+    if arguments.json:
+        print(json.dumps(rows, indent=1))
+        return
+    for row in rows:
+        print(
+            "  ".join(
+                f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items()
+            )
+        )
 
 
 if __name__ == "__main__":
