@@ -20,6 +20,9 @@ class Diagnosing(Settings):
     """Laws that the engine itself runs again, best first [1]."""
     free: int = Field(3, ge=0, le=16)
     """Of them, laws that are fitted at most with place, time, form and base free [1]."""
+    budget: float = Field(5e9, gt=0)
+    """Particles times steps that those fits take together, roughly: where bodies are large, clips long or tissue so
+    viscous that steps are short, fewer laws are fitted that way, or none [1]."""
     second: bool = True
     """Whether a second effect is looked for [1]."""
     noise: Literal["correlated", "independent"] = "correlated"
@@ -28,6 +31,8 @@ class Diagnosing(Settings):
     """Whether every point may have a constant error of its own [1]."""
     model_error: float = Field(1.0, ge=0, le=10)
     """Times the measured error of the simulator [1]."""
+    cause: Literal["searched", "symptom"] = "searched"
+    """Where local laws are tried: everywhere, or where the misfit is largest [-]."""
     calibrated: bool = True
     """Whether the thresholds of the calibration are used; without, any evidence above zero counts [1]."""
     device: Literal["cpu", "cuda"] = "cpu"

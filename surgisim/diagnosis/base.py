@@ -16,6 +16,7 @@ from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Whitener
 from surgisim.diagnosis.tangent import Tangent, base_piola, tangent
+from surgisim.mpm.closing import follow
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Breakdown, Run
@@ -26,6 +27,9 @@ START = np.array([np.log(3e3), 0.45, np.log(3e-3)])
 SPREAD = np.array([0.8, 0.03, 0.8])
 LOW, HIGH = np.array([np.log(5e2), 0.30, np.log(3e-4)]), np.array([np.log(5e4), 0.485, np.log(3e-2)])
 STEP = np.array([0.2, 0.01, 0.3])
+SLOWER = 8
+"""Times that viscosity may shorten the stable step of tissue of the usual stiffness (`mpm/stable.py`). To a base
+without memory, tissue that relaxes looks viscous without bound, and its runs would take minutes each."""
 SCAN = (-1.0, -0.35, 0.3, 1.0)
 """Where the descent may start, in logarithms of E and of eta / E away from START."""
 DESCENTS = 8
@@ -61,6 +65,15 @@ class Base:
 def values_of(x: np.ndarray) -> Values:
     E, nu = float(np.exp(x[0])), float(x[1])
     return {TERMS[0]: {"E": E, "nu": min(nu, 0.485)}, TERMS[1]: {"eta": E * float(np.exp(x[2]))}}
+
+
+def bounded(x: np.ndarray, clip: Clip) -> np.ndarray:
+    """The nearest numbers that are tried, (3,)."""
+    x = np.clip(x, LOW, HIGH)
+    E, nu, rho, dx = np.exp(START[0]), START[1], clip.density, clip.body.spacing
+    elastic = dx / 2 / np.sqrt(E * (1 - nu) / (1 + nu) / (1 - 2 * nu) / rho)
+    most = rho * dx**2 / 5 / (elastic / SLOWER)
+    return np.array([x[0], x[1], min(x[2], np.log(most) - x[0])])
 
 
 def fit_base(
@@ -134,7 +147,7 @@ class _Around:
 
     def start(self) -> np.ndarray:
         """The best of a few stiffnesses and viscosities: a ring-down misfits by whole periods."""
-        tries = [np.clip(self.x + np.array([e, 0.0, lag]), LOW, HIGH) for e in SCAN for lag in SCAN]
+        tries = [bounded(self.x + np.array([e, 0.0, lag]), self.clip) for e in SCAN for lag in SCAN]
         return min(tries, key=lambda y: self.cost(y, self.left(y)))
 
     def descend(self, y: np.ndarray, say: Callable[[str], None]) -> np.ndarray:
@@ -148,7 +161,7 @@ class _Around:
             pull = self.space.gram(self.whiten(slopes).T, left[:, None])[:, 0] - (y - START) / SPREAD**2
             for _ in range(4):
                 step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), pull)
-                there = np.clip(y + np.clip(step, -1.2 * SPREAD, 1.2 * SPREAD), LOW, HIGH)
+                there = bounded(y + np.clip(step, -1.2 * SPREAD, 1.2 * SPREAD), self.clip)
                 left_there = self.left(there)
                 cost_there = self.cost(there, left_there)
                 if cost_there < cost:
@@ -182,11 +195,8 @@ def base_drive(prepared: Prepared, clip: Clip, values: Values, safety: float = B
 
 
 def _run(prepared: Prepared, clip: Clip, values: Values, **span) -> Run:
-    return boldly(
-        lambda safety: prepared.simulator.run(
-            prepared.theta(values), base_drive(prepared, clip, values, safety), **span
-        )
-    )
+    theta = prepared.theta(values)
+    return boldly(lambda safety: follow(prepared.simulator, theta, base_drive(prepared, clip, values, safety), **span))
 
 
 def boldly(run: Callable[[float], Run]) -> Run:
@@ -208,8 +218,7 @@ def _by_poisson(prepared, near: Tangent, x) -> np.ndarray:
 
 
 def _short(clip, prepared, x, run, carry, first, last) -> np.ndarray:
-    begin = run.state(first) if first else None
-    moved = _run(prepared, clip, values_of(x), begin=begin, first=first, last=last)
+    moved = _run(prepared, clip, values_of(x), before=run if first else None, first=first, last=last)
     return carried(carry, moved)[:, 1:]
 
 

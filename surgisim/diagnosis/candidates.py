@@ -20,8 +20,16 @@ Parts = Iterator[tuple[str, Callable[[], Iterator[Block]]]]
 """Names of parts, and what makes their blocks."""
 
 
-def blocks(clip: Clip, base: Base) -> Parts:
-    """All that is tried, one part after the other, each made when it is asked for."""
+def blocks(clip: Clip, base: Base, only: np.ndarray | None = None) -> Parts:
+    """All that is tried, one part after the other, each made when it is asked for.
+
+    only: where alone local laws are tried [m], (3,); None for everywhere.
+    """
+
+    def centers(depth: float = 0.15) -> np.ndarray:
+        found = places(clip, depth=depth)
+        return found if only is None else found[[np.linalg.norm(found - only, axis=1).argmin()]]
+
     yield "laws of the whole body", lambda: iter([whole.everywhere(clip, base)])
     turns = np.arange(whole.ANGLES) * np.pi / whole.ANGLES
     yield "strands", lambda: iter([whole.strands(clip, base, turns, (0.2,))])
@@ -32,8 +40,8 @@ def blocks(clip: Clip, base: Base) -> Parts:
     if len(clip.motion.radius):
         yield "slipping grips", lambda: local.slipping(clip, base)
     for depth in (0.15, 0.45):
-        yield "lumps", lambda d=depth: iter([local.lumps(clip, base, places(clip, depth=d))])
-    for center in places(clip):
+        yield "lumps", lambda d=depth: iter([local.lumps(clip, base, centers(d))])
+    for center in centers():
         yield "pushes and bands", lambda c=center: iter([local.pushes(clip, base, c)])
     yield "contractions", lambda: whole.contracting(clip, base)
 

@@ -46,6 +46,8 @@ class Clip:
     """Out of the base towards the observed side, (3,)."""
     device: str = "cpu"
     """Where the engine runs."""
+    shifted: bool = True
+    """Whether paths count from where grips find their tissue (`mpm/closing.py`), or from where it was at rest."""
 
     @property
     def frames(self) -> int:

@@ -10,12 +10,13 @@ from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, nuisance, verdict
-from surgisim.diagnosis.base import Base, fit_base
+from surgisim.diagnosis.base import BOLD, Base, fit_base
 from surgisim.diagnosis.candidates import Parts, blocks, costly
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.evidence import Finding, by_law, judge
 from surgisim.diagnosis.flexible import flexible
 from surgisim.diagnosis.laws import law_of, respond
+from surgisim.diagnosis.locate import worst
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
@@ -25,6 +26,8 @@ from surgisim.mpm.simulator import Breakdown
 from surgisim.recordings.recording import Recording
 
 Progress = Callable[[float, float, str], None]
+RUNS = 35
+"""That fitting a law with everything about it free takes, roughly."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,11 @@ class Refit:
     @property
     def term(self) -> str:
         return self.finding.hypothesis.term
+
+    @property
+    def searched(self) -> float:
+        """log evidence before the engine ran."""
+        return self.log_evidence - 0.5 * (self.gain - self.finding.gain)
 
 
 @dataclass(frozen=True)
@@ -81,32 +89,43 @@ def diagnose(
         laws = by_law(findings)
     ranked, refits = sorted(laws, key=lambda term: -laws[term][0]), []
     if detected:
-        best = laws[ranked[0]][2][0].gain
-        waiting = [t for t in ranked if laws[t][2][0].gain > calibration.RIVAL * best][: settings.refine]
-        while waiting:
-            term = waiting.pop(0)
-            progress(0.65 + 0.02 * len(refits), 1, f"the engine with {term}")
-            fine, evidence = sharpened(case, laws[term], case.z)
-            refits.append(refit(case, fine, evidence, case.z))
-            known = {r.term for r in refits}
-            top = max(r.log_evidence for r in refits)
-            rest = [t for t in ranked if t not in known and t not in waiting and laws[t][0] > top]
-            if not waiting and len(refits) < 2 * settings.refine:
-                # What the engine does not confirm gives way to what the tangent puts next.
-                waiting = rest[:1]
-        refits.sort(key=lambda r: -r.log_evidence)
-        close = [r for r in refits if r.gain > calibration.CLOSE * refits[0].gain][: settings.free]
-        for n, one in enumerate(close):
-            done = 0.75 + 0.1 * n / len(close)
-            better = freed(case, one, case.z, lambda text, done=done: progress(done, 1, text))
-            refits = [better if r is one else r for r in refits]
-        refits.sort(key=lambda r: -r.log_evidence)
+        case, refits = compete(case, laws, ranked, progress)
     second = None
     if detected and settings.second and refits[0].gain < calibration.EXPLAINED_WELL * verdict.explainable(bend):
         progress(0.86, 1, f"what {refits[0].term} leaves")
         second = another(case, refits[0], progress)
     progress(0.95, 1, "verdict")
     return verdict.write(case, laws, ranked, refits, second, bend, detected)
+
+
+def compete(case: Case, laws: dict, ranked: list[str], progress: Progress) -> tuple[Case, list[Refit]]:
+    """The best laws as the engine runs them, best first, and the case with what was learned of its grips."""
+    settings, refits = case.settings, []
+    best = laws[ranked[0]][2][0].gain
+    waiting = [t for t in ranked if laws[t][2][0].gain > calibration.RIVAL * best][: settings.refine]
+    while waiting:
+        term = waiting.pop(0)
+        progress(0.65 + 0.02 * len(refits), 1, f"the engine with {term}")
+        fine, evidence = sharpened(case, laws[term], case.z)
+        refits.append(refit(case, fine, evidence, case.z))
+        known = {r.term for r in refits}
+        top = max(r.log_evidence for r in refits)
+        rest = [t for t in ranked if t not in known and t not in waiting and laws[t][0] > top]
+        if not waiting and len(refits) < 2 * settings.refine:
+            # What the engine does not confirm gives way to what the tangent puts next.
+            waiting = rest[:1]
+    refits.sort(key=lambda r: -r.log_evidence)
+    if from_rest(case, refits[0], case.z):
+        case = replace(case, clip=replace(case.clip, shifted=False))
+        refits = [refit(case, r.finding, r.searched, case.z) for r in refits]
+        refits.sort(key=lambda r: -r.log_evidence)
+    close = [r for r in refits if r.gain > calibration.CLOSE * refits[0].gain]
+    close = close[: min(settings.free, int(settings.budget / fit_of_a_law(case)))]
+    for n, one in enumerate(close):
+        done = 0.75 + 0.1 * n / len(close)
+        better = freed(case, one, case.z, lambda text, done=done: progress(done, 1, text))
+        refits = [better if r is one else r for r in refits]
+    return case, sorted(refits, key=lambda r: -r.log_evidence)
 
 
 def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress) -> Case:
@@ -140,7 +159,8 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
 def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts | None = None) -> list[Finding]:
     """Every hypothesis of `parts` (or of all that is cheap) against a whitened residual."""
     residuals = np.concatenate([z[:, None].astype(np.float32), nulls], 1)
-    parts, found, source = list(parts or blocks(case.clip, case.base)), [], 0
+    only = worst(case.clip, case.base.simulated) if case.settings.cause == "symptom" else None
+    parts, found, source = list(parts or blocks(case.clip, case.base, only)), [], 0
     for n, (name, make) in enumerate(parts):
         progress(n / len(parts), f"trying {name} ({n + 1} of {len(parts)})")
         for block in make():
@@ -185,6 +205,27 @@ def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: 
     if response is None:
         return Refit(finding, finding.amplitude, np.zeros_like(base.simulated), 0.0, -np.inf)
     return Refit(finding, kept, response, gain, evidence + 0.5 * (gain - finding.gain))
+
+
+def from_rest(case: Case, best: Refit, z: np.ndarray) -> bool:
+    """Whether paths of grips count from where tissue was at rest: whether the best law fits clearly better that way."""
+    law, until = law_of(best.finding.hypothesis, best.amplitude, case.clip), case.clip.until
+    costs = []
+    for shifted in (True, False):
+        try:
+            moved = respond(replace(case.clip, shifted=shifted), case.base, law, case.memo)
+        except Breakdown:
+            return False
+        left = z - case.whiten(moved[:, :until] - case.base.simulated[:, :until])
+        costs.append(float(case.space.gram(left[:, None], left[:, None])[0, 0]))
+    return costs[0] - costs[1] > calibration.THRESHOLD
+
+
+def fit_of_a_law(case: Case) -> float:
+    """Particles times steps that a law with everything about it free takes, roughly."""
+    base = case.base
+    steps = base.prepared.per_frame(base.values, case.clip.fps, BOLD) * case.clip.until
+    return RUNS * len(base.prepared.simulator.rest) * steps
 
 
 def freed(case: Case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:

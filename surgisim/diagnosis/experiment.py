@@ -23,7 +23,7 @@ def separating(clip: Clip, base: Base, first: Law, second: Law, memo: Memo, name
     for text, motion in pulls(clip, rng):
         trial = _instead(clip, motion)
         try:
-            seen = [respond(trial, base, replace(law, motion=None, begins=0.0), memo) for law in (first, second)]
+            seen = [respond(trial, base, replace(law, motion=None), memo) for law in (first, second)]
         except Breakdown:
             continue
         differ = float(np.sqrt(((seen[0] - seen[1]) ** 2).sum(-1).mean()))

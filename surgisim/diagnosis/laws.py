@@ -10,6 +10,7 @@ from surgisim.diagnosis.base import SAFETY, Base, boldly, carried
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.hypothesis import RISE, Hypothesis
 from surgisim.diagnosis.memo import Memo
+from surgisim.mpm.closing import follow
 from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Run
 from surgisim.physics.catalogue import choose
@@ -31,8 +32,6 @@ class Law:
     places: dict[str, Place]
     motion: Motion | None = None
     """Where a grip does not carry its tissue along as recorded."""
-    begins: float = 0.0
-    """A law without an onset of its own is switched on here [s]."""
 
 
 def law_of(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> Law:
@@ -50,7 +49,7 @@ def law_of(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> Law:
         own = {"slack": h.about["slack"], "length": h.about["length"], "yaw": yaw, "pitch": pitch}
         return Law({term: {"stiffness": a, **own}}, here)
     if term == "gravity":
-        return Law({term: dict(zip("xyz", map(float, amplitude), strict=True))}, {}, begins=h.onset + RISE / 2)
+        return Law({term: {**dict(zip("xyz", map(float, amplitude), strict=True)), "onset": h.onset + RISE / 2}}, {})
     if term == "respiration":
         return Law({term: _breath(amplitude.reshape(4, 3), h.about["rate"])}, {})
     if term == "tool_slip":
@@ -136,23 +135,24 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
     def make() -> dict[str, np.ndarray]:
         prepared = clip.prepared(tuple(values), motion=motion)
         theta = prepared.theta(values, law.places)
-        first = int(law.begins * clip.fps)
-        begin = None if first == 0 else base.run.state(first)[:2]
 
         def at(safety: float) -> Run:
             per_frame = steps(clip, prepared, theta, safety)
             drive = prepared.drive(
                 motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames, places=law.places
             )
-            return prepared.simulator.run(theta, drive, begin=begin, first=first, last=frames - 1)
+            if clip.shifted:
+                return follow(prepared.simulator, theta, drive, last=frames - 1)
+            return prepared.simulator.run(theta, drive, last=frames - 1)
 
         run = boldly(at)
-        seen = carried(prepared.simulator.carry(clip.rest), Run(run.u, run.v, run.q))
-        return {"seen": np.concatenate([base.simulated[:, :first], seen], 1).astype(np.float32)}
+        return {"seen": carried(prepared.simulator.carry(clip.rest), run).astype(np.float32)}
 
     moved = None if law.motion is None else np.round(law.motion.position, 9).tolist()
     where = {n: [list(p.center), p.extent, p.normal] for n, p in law.places.items()}
-    return memo(["law", base.x.tolist(), values, _plain(where), moved, law.begins, frames], make)["seen"].astype(float)
+    return memo(["law", base.x.tolist(), values, _plain(where), moved, frames, clip.shifted], make)["seen"].astype(
+        float
+    )
 
 
 def steps(clip: Clip, prepared: Prepared, theta: np.ndarray, safety: float = SAFETY) -> int:
@@ -234,7 +234,7 @@ def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Cl
         params = choose([name])[name].params
         for key, value in numbers.items():
             low = high = value
-            if name == "gravity":
+            if name == "gravity" and key in "xyz":
                 reach = np.hypot(1.645 * spread["xyz".index(key)], by_stiffness * abs(value))
                 low, high = value - reach, value + reach
             elif scaling.get(h.term) == key:

@@ -28,6 +28,14 @@ def symptom(clip: Clip, noise: Noise, residual: np.ndarray, rng: np.random.Gener
     return z, float(np.quantile((draws / unit).max((1, 2)), WORST))
 
 
+def worst(clip: Clip, simulated: np.ndarray) -> np.ndarray:
+    """The point that the fitted frames find farthest from where it is predicted, its mean off [m], (3,)."""
+    seen = clip.seen[:, : clip.until, None]
+    left = np.where(seen, (clip.moved - simulated)[:, : clip.until], np.nan)
+    left = left - np.nanmean(left, 1, keepdims=True)
+    return clip.rest[int(np.nanmean((left**2).sum(-1), 1).argmax())]
+
+
 def _smoother(clip: Clip):
     away = np.linalg.norm(clip.rest[:, None] - clip.rest[None], axis=-1)
     weight = np.exp(-0.5 * (away / REACH) ** 2)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cho_solve
 
-from surgisim.diagnosis.base import HIGH, LOW, SPREAD, START, Base, carried, simulate
+from surgisim.diagnosis.base import SPREAD, START, bounded
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import APART, scale
 from surgisim.diagnosis.hypothesis import Hypothesis
@@ -70,7 +70,7 @@ def refined(
     space = metric(np.delete(case.space.columns, case.slopes, axis=1))
 
     def turned(x: np.ndarray) -> tuple[Hypothesis, np.ndarray, np.ndarray]:
-        there = _base_at(base, x[len(own) :])
+        there = bounded(base.x + x[len(own) :] * SPREAD, clip)
         # Only what pushes or resists over the tissue's own stiffness shows.
         return *beside(*_turned(h, amplitude, own, x[: len(own)], clip), float(np.exp(there[0] - base.x[0]))), there
 
@@ -81,7 +81,7 @@ def refined(
     def left(x: np.ndarray, _worker: int = 0) -> np.ndarray | None:
         try:
             law, there = law_at(x)
-            moved = respond(clip, _moved(case, there, law.begins), law, case.memo, until)
+            moved = respond(clip, replace(base, x=there), law, case.memo, until)
         except (Breakdown, Misplaced):
             # A place outside the body, or tissue torn apart: not a law of this clip.
             return None
@@ -130,29 +130,13 @@ def refined(
             J = None
     law, there = law_at(x)
     try:
-        response = respond(clip, _moved(case, there, law.begins), law, case.memo) - base.simulated
+        response = respond(clip, replace(base, x=there), law, case.memo) - base.simulated
     except Breakdown:
         return None
     found, strength, _ = turned(x)
     sd = np.sqrt(np.diag(np.linalg.inv(normal)))[: len(own)]
     off = [turned(x + np.append(side, np.zeros(3)))[1] - strength for side in np.diag(sd)]
     return Refined(found, strength, np.sqrt(np.sum(np.square(off), 0)), there, response, nothing - best)
-
-
-def _base_at(base: Base, by: np.ndarray) -> np.ndarray:
-    """The base's numbers moved by prior standard deviations, (3,)."""
-    return np.clip(base.x + by * SPREAD, LOW, HIGH)
-
-
-def _moved(case, x: np.ndarray, begins: float) -> Base:
-    """The base at other numbers; with its own run up to where a law begins [s], if it begins late."""
-    base, first = case.base, int(begins * case.clip.fps)
-    if np.array_equal(x, base.x):
-        return base
-    if first == 0:
-        return replace(base, x=x)
-    _, run = simulate(base.prepared, case.clip, x, case.memo, first + 1)
-    return replace(base, x=x, run=run, simulated=carried(base.prepared.simulator.carry(case.clip.rest), run))
 
 
 def _knobs(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> list[tuple[str, object, float]]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import cho_solve
 
-from surgisim.diagnosis.base import HIGH, LOW, SPREAD, carried, simulate
+from surgisim.diagnosis.base import SPREAD, bounded, carried, simulate
 from surgisim.diagnosis.errors import rms
 from surgisim.diagnosis.laws import law_of, respond
 from surgisim.mpm.simulator import Breakdown
@@ -25,7 +25,7 @@ def together(case, refits) -> np.ndarray:
         return plain
     left = case.z - sum(case.whiten(r.response[:, :until]) for r in refits)
     likely = cho_solve(case.space.factor, case.space.seen_through(left))[case.slopes]
-    x = np.clip((base.x if first is None else first) + likely * SPREAD, LOW, HIGH)
+    x = bounded((base.x if first is None else first) + likely * SPREAD, clip)
     try:
         drive, run = simulate(base.prepared, clip, x, case.memo, clip.frames)
         simulated = carried(base.prepared.simulator.carry(clip.rest), run)

@@ -44,21 +44,30 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         alike = [r for r in refits[1:] if _cos(case, first, r) > calibration.ALIKE and chances[r.term] > 0.1]
         after = together(case, accepted)
         noise = noise_beside(case, after)
-        gained, took, left = explained, taken(case, after, noise.sigma), still(case, bend, after)
-        explained = max(gained, took)
-        shares = {"gained": float(gained), "taken": took, "left": left}
+        shares = {
+            "gained": float(explained),
+            "taken": taken(case, after, noise.sigma),
+            "left": still(case, bend, after),
+            "predicted": predicted(case, after, noise.sigma),
+        }
+        explained = max(shares["gained"], shares["taken"])
         verdict = "named"
-        if explained < calibration.EXPLAINED or first.log_evidence < calibration.THRESHOLD:
+        if doubtful(first.term, shares):
+            verdict, explained = "unexplained", min(explained, 1 - shares["left"])
+        elif explained < calibration.EXPLAINED or first.log_evidence < calibration.THRESHOLD:
             verdict = "unexplained"
         elif alike and chances[first.term] < calibration.SURE:
             verdict = "equivalence class"
         effects = [_effect(case, r, chances, laws, refits, n) for n, r in enumerate(accepted)]
         if verdict == "unexplained":
             for effect in effects:
-                effect["probability"] = min(effect["probability"], float(np.clip(explained / 2, 0.0, 0.5)))
+                effect["probability"] = min(effect["probability"], float(np.clip(explained / 2, 0.0, 0.45)))
     else:
         noise = noise_beside(case, after)
-    placebo = _placebo(case, refits, laws, rng) if detected else None
+    named = verdict in ("named", "equivalence class")
+    # What is not believed is not modelled.
+    after = after if named else base.simulated
+    placebo = _placebo(case, refits, laws, rng) if named else None
     fit, held_out = errors(case, after, placebo, noise.sigma)
     z, reach = symptom(clip, noise, residual(case, base.simulated, False, rest_only=False), rng)
     freed = case.z - case.space.explained(case.z)
@@ -67,7 +76,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
     heat = heat / max(heat.max(), 1e-30)
     if effects and refits[0].finding.hypothesis.place is not None and refits[0].finding.hypothesis.place.normal is None:
         heat = of_places(clip, laws[refits[0].term][2], base.prepared.simulator.rest)
-    if verdict in ("named", "equivalence class") and case.settings.experiment and len(refits) > 1:
+    if named and case.settings.experiment and len(refits) > 1:
         pair = [law_of(r.finding.hypothesis, r.amplitude, clip) for r in refits[:2]]
         effects[0]["separating_experiment"] = separating(
             clip, base, *pair, case.memo, (refits[0].term, refits[1].term), rng
@@ -98,7 +107,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
     mismatch = Mismatch(
         points=clip.rest,
         residual_before=residual(case, base.simulated),
-        residual_after=residual(case, after if verdict != "unexplained" else base.simulated),
+        residual_after=residual(case, after),
         z=z,
         significant=reach,
         particles=base.prepared.simulator.rest,
@@ -106,7 +115,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         cause_time=np.concatenate([when, np.zeros(clip.frames - clip.until)]),
         phase=clip.phases(),
     )
-    return diagnosis, physics(case, accepted if verdict in ("named", "equivalence class") else []), mismatch
+    return diagnosis, physics(case, accepted if named else []), mismatch
 
 
 def noise_beside(case, after: np.ndarray) -> Noise:
@@ -123,6 +132,29 @@ def taken(case, after: np.ndarray, sigma: float) -> float:
     least = 3e6 * sigma**2
     before, left = (rms(case, s)[0] ** 2 - least for s in (case.base.simulated, after))
     return float(np.clip(1 - left / before, 0, 1)) if before > 0 else 0.0
+
+
+def predicted(case, after: np.ndarray, sigma: float) -> float | None:
+    """Share of the misfit's mean square beyond the noise that a prediction takes away on frames held out.
+
+    None where none are held out, or where nothing stands out of the noise there without it.
+    """
+    least = 3e6 * sigma**2
+    before, left = (rms(case, s)[1] for s in (case.base.simulated, after))
+    if before is None or before**2 < calibration.SHOWS**2 * least:
+        return None
+    return float(1 - (left**2 - least) / (before**2 - least))
+
+
+def doubtful(term: str, shares: dict[str, float | None]) -> bool:
+    """Whether a law that explains enough is not to be believed all the same.
+
+    A push of free place, direction and course follows whatever comes and goes: only where it leaves next to nothing is
+    it one. And no law is believed that leaves a large misfit on other frames as it was.
+    """
+    if term == "hidden_contact" and shares["left"] > calibration.PUSH_LEAVES:
+        return True
+    return shares["predicted"] is not None and shares["predicted"] < calibration.PREDICTED
 
 
 def still(case, bend, after: np.ndarray) -> float:

@@ -18,7 +18,7 @@ def verdict(**planted):
 
 @pytest.fixture(scope="module")
 def tilted():
-    return verdict(values={"gravity": {"x": 8.0, "y": 0.0, "z": 0.0}})
+    return verdict(values={"gravity": {"x": 8.0, "y": 0.0, "z": 0.0, "onset": -1.0}})
 
 
 @pytest.fixture(scope="module")

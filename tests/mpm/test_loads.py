@@ -55,7 +55,7 @@ def test_a_body_with_a_weight_on_it_sags_more_and_rings_slower():
 def test_gravity_as_a_law_is_gravity_of_the_world():
     made = prepare(BODY, under("newtonian"), density=DENSITY, gravity=(0.0, 9.81, -3.0), precision="double")
     world, _ = moved("newtonian", made=made)
-    law, _ = moved("gravity", x=0.0, y=9.81, z=-3.0)
+    law, _ = moved("gravity", x=0.0, y=9.81, z=-3.0, onset=-1.0)
     assert np.allclose(law, world, rtol=0, atol=1e-9 * np.abs(world).max())
 
 

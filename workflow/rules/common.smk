@@ -132,6 +132,7 @@ ABLATIONS = {
     "no_offset": {"offsets": False},
     "no_nulls": {"calibrated": False},
     "no_model_error": {"model_error": 0.0},
+    "no_cause_map": {"cause": "symptom"},
 }
 SHORTER = {"until_load": "load", "until_hold": "hold"}
 WAYS = {"main": {}, "shuffled": {}, **dict.fromkeys(SHORTER, {}), **ABLATIONS}

@@ -128,7 +128,7 @@ def heavier(recording: Recording) -> Law:
     down = np.array(recording.gravity) / GRAVITY
 
     def make(x):
-        return {"gravity": dict(zip("xyz", (x[0] * down).tolist(), strict=True))}, {}
+        return {"gravity": {**dict(zip("xyz", (x[0] * down).tolist(), strict=True)), "onset": -1.0}}, {}
 
     return Law("gravity", make, ((1.0, 5.0, 14.0),), (-15.0,), (15.0,))
 
