@@ -115,3 +115,24 @@ def test_a_run_is_invented_sealed_diagnosed_opened_and_scored(tmp_path):
     said = (tree.out / "logs" / "blind" / "4" / "0" / "main" / "score.log").read_text()
     assert "does not have the seal that was published before the diagnosis" in said
     assert not (out / "0" / "main" / "score.json").exists()
+
+
+@pytest.mark.slow
+def test_three_real_cases_go_from_their_seal_to_a_score(tmp_path):
+    for name in ("surgisim", "stages", "workflow", "config", "envs"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    tree = Tree(tmp_path, tmp_path / "out")
+    few = {"points": 80, "spacing": 0.004, "spacing_coarse": 0.005, "only": ["stiff_inclusion", "gravity"]}
+    tree.choices = {"cases": 3, "seed": 4, "invent": few | {"snr_low": 3.0, "snr_high": 5.0}}
+    assert tree.run("--keep-going", "blind") == 0
+    out = tmp_path / "out" / "blind" / "4"
+    board = json.loads((out / "main" / "scoreboard.json").read_text())
+    assert (board["count"], board["seals"]) == (3, 3)
+    local, everywhere, empty = board["cases"]
+    assert [c["concealed"][0]["term"] for c in (local, everywhere)] == ["stiff_inclusion", "gravity"]
+    assert everywhere["top1"]
+    assert everywhere["held_out"]["after"] < everywhere["held_out"]["before"]
+    assert local["top1"]
+    assert local["places"][0]["right"]
+    assert empty["concealed"] == []
+    assert not empty["false_discovery"]
