@@ -19,12 +19,16 @@ CLOSE = 0.5
 """Share of the best law's gain, as the engine ran both, beyond which a law is fitted with everything free too."""
 SLACK = 120.0
 """chi square that a smooth field gains where nothing is hidden, beyond simulated nulls: the simulator's error."""
-SECOND = 0.2
-"""Share of it that a second law must add."""
+SECOND = 0.5
+"""Share of what a first law leaves of it that a second law must explain."""
+FITTED_MISFIT = 0.03
+"""Share of the explained chi square that a law still leaves wrong once the engine has fitted it."""
 ALIKE = 0.85
 """|cos| of whitened signatures beyond which two laws are not told apart."""
 EXPLAINED_WELL = 0.9
-"""Share beyond which no second law is looked for."""
+"""Share beyond which no law is tried that only runs of the engine can tell."""
+LITTLE_LEFT = 0.1
+"""Share of the explainable misfit beside a first law below which no second one is looked for."""
 SURE = 0.5
 """Probability that a law must have to be named alone."""
 PUSH_LEAVES = 0.25

@@ -15,6 +15,7 @@ from surgisim.diagnosis.candidates import Parts, blocks, costly
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.evidence import Finding, by_law, judge
 from surgisim.diagnosis.flexible import flexible
+from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import law_of, respond
 from surgisim.diagnosis.locate import worst
 from surgisim.diagnosis.memo import Memo
@@ -42,6 +43,8 @@ class Refit:
     log_evidence: float
     x: np.ndarray | None = None
     """The base that was fitted with it, (3,); None where the base stayed."""
+    draws: tuple[tuple[Hypothesis, np.ndarray], ...] = ()
+    """The law with other numbers that would do, drawn from its posterior; none where it was not fitted freely."""
 
     @property
     def term(self) -> str:
@@ -91,7 +94,7 @@ def diagnose(
     if detected:
         case, refits = compete(case, laws, ranked, progress)
     second = None
-    if detected and settings.second and refits[0].gain < calibration.EXPLAINED_WELL * verdict.explainable(bend):
+    if detected and settings.second and verdict.beside(case, bend, refits[:1]) > calibration.LITTLE_LEFT:
         progress(0.86, 1, f"what {refits[0].term} leaves")
         second = another(case, refits[0], progress)
     progress(0.95, 1, "verdict")
@@ -233,9 +236,9 @@ def freed(case: Case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> 
     found = refined(case, z, (one.finding.hypothesis, one.amplitude), one.response, say)
     if found is None or found.gain <= one.gain:
         return one
-    finding = replace(one.finding, hypothesis=found.hypothesis, spread=found.spread)
+    finding = replace(one.finding, hypothesis=found.hypothesis)
     evidence = one.log_evidence + 0.5 * (found.gain - one.gain)
-    return Refit(finding, found.amplitude, found.response, found.gain, evidence, found.x)
+    return Refit(finding, found.amplitude, found.response, found.gain, evidence, found.x, tuple(found.draws))
 
 
 def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:

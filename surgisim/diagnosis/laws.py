@@ -1,6 +1,7 @@
 """From a hypothesis and its amplitude to laws the engine runs."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -216,8 +217,16 @@ def _slipped(clip: Clip, h: Hypothesis, amplitude: float) -> Motion:
     return replace(motion, position=position)
 
 
-def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Clip, base: Base) -> dict[str, dict]:
-    """Parameters with 90 % intervals and units, as diagnosis.json has them."""
+def described(
+    h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Clip, base: Base,
+    draws: Sequence[tuple[Hypothesis, np.ndarray]] = (),
+) -> dict[str, dict]:  # fmt: skip
+    """Parameters with 90 % intervals and units, as diagnosis.json has them.
+
+    draws: the law with other numbers that would do; without them only its strength has an interval, from `spread`.
+    """
+    if draws:
+        return _of_draws(h, amplitude, clip, draws)
     law = law_of(h, amplitude, clip)
     size = max(float(np.linalg.norm(amplitude)), 1e-30)
     share = min(1.645 * float(np.linalg.norm(spread * amplitude)) / size**2, 0.95)
@@ -252,6 +261,33 @@ def described(h: Hypothesis, amplitude: np.ndarray, spread: np.ndarray, clip: Cl
         a = float(amplitude[0])
         result["slip"] = {"value": a, "low": a * (1 - share), "high": a * (1 + share), "unit": "1"}
         result["tau"] = {"value": float(h.about["tau"]), "low": 0.0, "high": 1.0, "unit": "s"}
+    return result
+
+
+def _of_draws(h: Hypothesis, amplitude: np.ndarray, clip: Clip, draws) -> dict[str, dict]:
+    value, near = _numbers(h, amplitude, clip), [_numbers(*draw, clip) for draw in draws]
+    result = {}
+    for key, (best, unit) in value.items():
+        off = np.array([n[key][0] - best for n in near])
+        if unit == "rad":
+            off = (off + np.pi) % (2 * np.pi) - np.pi
+        low, high = np.quantile(off, [0.05, 0.95])
+        result[key] = {
+            "value": best, "low": best + min(float(low), 0.0), "high": best + max(float(high), 0.0), "unit": unit,
+        }  # fmt: skip
+    return result
+
+
+def _numbers(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> dict[str, tuple[float, str]]:
+    """What a law's parameters are, with their units."""
+    if h.term == "tool_slip":
+        return {"slip": (min(float(amplitude[0]), 1.0), "1"), "tau": (float(h.about["tau"]), "s")}
+    result = {}
+    for name, numbers in law_of(h, amplitude, clip).values.items():
+        if name == "hidden_contact" and h.term == "added_mass":
+            continue
+        params = choose([name])[name].params
+        result |= {key: (float(value), params[key].unit) for key, value in numbers.items()}
     return result
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cho_solve
 
+from surgisim.diagnosis import calibration
 from surgisim.diagnosis.base import SPREAD, START, bounded
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import APART, scale
@@ -39,14 +40,16 @@ ROUNDS, FRESH = 8, 2
 DONE, LITTLE, FAR = 0.004, 3.0, 0.15
 """Share of the whole gain, and chi square, below which a step is the last; share beyond which the next one takes
 differences afresh."""
+DRAWS = 200
+"""From the posterior, which intervals are read off."""
 
 
 @dataclass(frozen=True)
 class Refined:
     hypothesis: Hypothesis
     amplitude: np.ndarray
-    spread: np.ndarray
-    """Posterior standard deviation of the amplitude."""
+    draws: list[tuple[Hypothesis, np.ndarray]]
+    """The same law and its amplitude, drawn from the posterior."""
     x: np.ndarray
     """The base that goes with it, (3,)."""
     response: np.ndarray
@@ -134,9 +137,12 @@ def refined(
     except Breakdown:
         return None
     found, strength, _ = turned(x)
-    sd = np.sqrt(np.diag(np.linalg.inv(normal)))[: len(own)]
-    off = [turned(x + np.append(side, np.zeros(3)))[1] - strength for side in np.diag(sd)]
-    return Refined(found, strength, np.sqrt(np.sum(np.square(off), 0)), there, response, nothing - best)
+    # As uncertain as the verdict takes evidence to be: signatures are not exact.
+    heat = calibration.TEMPERATURE + calibration.MISFIT * max(nothing - best, 0.0)
+    spread = np.linalg.inv((normal - np.eye(len(x))) / heat + np.eye(len(x)))
+    rng = np.random.default_rng([case.settings.seed, 3])
+    draws = [turned(near)[:2] for near in rng.multivariate_normal(x, spread, DRAWS)]
+    return Refined(found, strength, draws, there, response, nothing - best)
 
 
 def _knobs(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> list[tuple[str, object, float]]:

@@ -36,9 +36,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         first = refits[0]
         explained = first.gain / total
         accepted = [first]
-        # What the first law's signature has wrong must not pass for a second law.
-        least = calibration.THRESHOLD + calibration.MISFIT * first.gain
-        if second is not None and second[0].gain > calibration.SECOND * total and second[1] > least:
+        if second is not None and pays(case, bend, first, *second):
             accepted.append(second[0])
             explained = min((first.gain + second[0].gain) / total, 1.0)
         alike = [r for r in refits[1:] if _cos(case, first, r) > calibration.ALIKE and chances[r.term] > 0.1]
@@ -157,6 +155,19 @@ def doubtful(term: str, shares: dict[str, float | None]) -> bool:
     return shares["predicted"] is not None and shares["predicted"] < calibration.PREDICTED
 
 
+def pays(case, bend, first, second, log_evidence: float) -> bool:
+    """Whether a second law says enough to be named beside the first; log_evidence: of it, before the engine ran."""
+    rest = beside(case, bend, [first]) * explainable(bend)
+    # What the first law's signature has wrong must not pass for a second law.
+    least = calibration.THRESHOLD + calibration.FITTED_MISFIT * first.gain
+    return second.gain > calibration.SECOND * rest and log_evidence > least
+
+
+def beside(case, bend, refits) -> float:
+    """As `still`, beside these laws as they were fitted."""
+    return still(case, bend, case.base.simulated + sum(r.response for r in refits))
+
+
 def still(case, bend, after: np.ndarray) -> float:
     """Share of what a smooth field could explain that is left beside a prediction."""
     clip = case.clip
@@ -222,7 +233,7 @@ def _effect(case, r, chances, laws, refits, number) -> dict:
         "probability": chances[r.term] if number == 0 else alone,
         "place": place,
         "time": {"onset": None if h.onset is None else float(h.onset), "end": None if h.end is None else float(h.end)},
-        "parameters": described(h, r.amplitude, r.finding.spread, case.clip, case.base),
+        "parameters": described(h, r.amplitude, r.finding.spread, case.clip, case.base, r.draws),
         "runners_up": runners[:RUNNERS],
         "separating_experiment": "",
         "log_evidence": float(r.log_evidence),
