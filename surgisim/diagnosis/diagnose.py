@@ -16,14 +16,13 @@ from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.evidence import Finding, by_law, judge
 from surgisim.diagnosis.flexible import flexible
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import law_of, respond
+from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
 from surgisim.diagnosis.locate import worst
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
 from surgisim.diagnosis.refine import refined
 from surgisim.diagnosis.sharpen import finer
-from surgisim.mpm.simulator import Breakdown
 from surgisim.recordings.recording import Recording
 
 Progress = Callable[[float, float, str], None]
@@ -190,7 +189,7 @@ def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: 
     for _ in range(rounds):
         try:
             moved = respond(clip, base, law_of(finding.hypothesis, amplitude, clip), case.memo)
-        except Breakdown:
+        except IMPOSSIBLE:
             amplitude = 0.5 * amplitude
             continue
         change = moved - base.simulated
@@ -217,7 +216,7 @@ def from_rest(case: Case, best: Refit, z: np.ndarray) -> bool:
     for shifted in (True, False):
         try:
             moved = respond(replace(case.clip, shifted=shifted), case.base, law, case.memo)
-        except Breakdown:
+        except IMPOSSIBLE:
             return False
         left = z - case.whiten(moved[:, :until] - case.base.simulated[:, :until])
         costs.append(float(case.space.gram(left[:, None], left[:, None])[0, 0]))

@@ -13,16 +13,18 @@ from surgisim.diagnosis.hypothesis import RISE, Hypothesis
 from surgisim.diagnosis.memo import Memo
 from surgisim.mpm.closing import follow
 from surgisim.mpm.setup import Prepared, Values
-from surgisim.mpm.simulator import Run
+from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.physics.catalogue import choose
 from surgisim.physics.heading import across_of
-from surgisim.physics.place import Place
+from surgisim.physics.place import Misplaced, Place
 
 SPHERE = 0.45
 """2 (4 - 5 nu) / 15 (1 - nu) near nu = .45."""
 SOFTEST, STIFFEST = 0.06, 40.0
 NEVER = 59.0
 """An end after every clip [s]."""
+IMPOSSIBLE = (Breakdown, Misplaced)
+"""Tissue torn apart, or a place outside the body: not a law of this clip."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ def stiffness_of(amplitude: float) -> float:
 
 
 def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = None) -> np.ndarray:
-    """Displacement of the points with the law [m], (K, frames, 3), by the engine. Raises Breakdown."""
+    """Displacement of the points with the law [m], (K, frames, 3), by the engine. Raises what is IMPOSSIBLE."""
     frames = frames or clip.frames
     values = {**base.values, **law.values}
     motion = clip.motion if law.motion is None else law.motion

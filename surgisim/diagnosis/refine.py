@@ -19,11 +19,9 @@ from surgisim.diagnosis.base import SPREAD, START, bounded
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import APART, scale
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import Law, beside, law_of, respond
+from surgisim.diagnosis.laws import IMPOSSIBLE, Law, beside, law_of, respond
 from surgisim.diagnosis.metric import metric
 from surgisim.estimation.trial import at_once
-from surgisim.mpm.simulator import Breakdown
-from surgisim.physics.place import Misplaced
 
 LOGARITHMS = {
     "tau": 0.7, "yield_strain": 0.4, "onset": 0.4, "k2": 0.6, "rate": 0.15, "most": 0.5, "period": 0.15,
@@ -85,8 +83,7 @@ def refined(
         try:
             law, there = law_at(x)
             moved = respond(clip, replace(base, x=there), law, case.memo, until)
-        except (Breakdown, Misplaced):
-            # A place outside the body, or tissue torn apart: not a law of this clip.
+        except IMPOSSIBLE:
             return None
         return z - whiten(moved - base.simulated[:, :until])
 
@@ -134,7 +131,7 @@ def refined(
     law, there = law_at(x)
     try:
         response = respond(clip, replace(base, x=there), law, case.memo) - base.simulated
-    except Breakdown:
+    except IMPOSSIBLE:
         return None
     found, strength, _ = turned(x)
     # As uncertain as the verdict takes evidence to be: signatures are not exact.

@@ -18,14 +18,14 @@ def finer(clip: Clip, base: Base, h: Hypothesis, step: float = 1.0) -> Iterator[
     turns = np.array([-0.5, 0.0, 0.5]) * step * 2 * np.pi / whole.ANGLES
     near = step * np.array([-0.5, 0.0, 0.5])
     if h.term in PUSHES:
-        for center in _around(clip, h, step, 0.0):
+        for center in _within(clip, _around(clip, h, step, 0.0), h.place.extent):
             yield local.pushes(clip, base, center, h.place.extent, h)
         for share in (0.7, 1.4):
             yield local.pushes(clip, base, np.array(h.place.center), share * h.place.extent, h)
     elif h.term == "stiff_inclusion":
         centers = np.concatenate([_around(clip, h, step, deep) for deep in (-0.5, 0.0, 0.5)])
         for share in (0.75, 1.0, 1.35):
-            yield local.lumps(clip, base, centers, share * h.place.extent)
+            yield local.lumps(clip, base, _within(clip, centers, share * h.place.extent), share * h.place.extent)
     elif h.term == "fibre":
         yield whole.strands(clip, base, h.about["turn"] + turns / 2, (0.05, 0.2, 0.5, 1.5))
     elif h.term == "respiration":
@@ -48,3 +48,9 @@ def _around(clip: Clip, h: Hypothesis, step: float, deep: float) -> np.ndarray:
     apart, (u, v) = 0.5 * step * APART * scale(clip), plane(clip)
     middle = np.array(h.place.center) - deep * apart * clip.normal
     return np.array([middle + apart * (a * u + b * v) for a in (-1, 0, 1) for b in (-1, 0, 1)])
+
+
+def _within(clip: Clip, centers: np.ndarray, extent: float) -> np.ndarray:
+    """Those of some places, (Q, 3), that have tissue within an extent, or a cell."""
+    free, reach = clip.body.rest[~clip.body.held], max(extent, clip.body.spacing)
+    return centers[[np.linalg.norm(free - c, axis=1).min() < reach for c in centers]]

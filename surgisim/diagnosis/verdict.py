@@ -12,12 +12,11 @@ from surgisim.diagnosis.errors import errors, residual, rms
 from surgisim.diagnosis.experiment import separating
 from surgisim.diagnosis.flexible import flexible
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import described, law_of, respond
+from surgisim.diagnosis.laws import IMPOSSIBLE, described, law_of, respond
 from surgisim.diagnosis.locate import cause, of_places, symptom
 from surgisim.diagnosis.model import base_numbers, physics
 from surgisim.diagnosis.noise import Noise, estimate
 from surgisim.diagnosis.together import together
-from surgisim.mpm.simulator import Breakdown
 
 RUNNERS, PLACEBOS = 4, 3
 """Other laws that an effect lists, and placebos that are tried where the engine breaks down with one."""
@@ -302,7 +301,7 @@ def _placebo(case, refits, laws, rng) -> np.ndarray | None:
         law = law_of(acting[k].hypothesis, acting[k].amplitude, case.clip)
         try:
             return respond(case.clip, case.base, law, case.memo)
-        except Breakdown:
+        except IMPOSSIBLE:
             continue
     return None
 

@@ -6,8 +6,12 @@ from planted import GRID, recording
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis.calibration import THRESHOLD
-from surgisim.diagnosis.diagnose import diagnose
+from surgisim.diagnosis.clip import clip_of
+from surgisim.diagnosis.diagnose import diagnose, prepare_case, refit
+from surgisim.diagnosis.evidence import Finding
+from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.memo import Memo
+from surgisim.physics.place import Place
 
 SETTINGS = Diagnosing(grid=GRID, nulls=8, experiment=False, free=0)
 
@@ -57,3 +61,10 @@ def test_the_mismatch_covers_every_point_frame_and_particle(tilted):
     assert mismatch.cause.min() >= 0
     assert mismatch.cause.max() == pytest.approx(1.0)
     assert np.isfinite(mismatch.residual_after[np.isfinite(mismatch.residual_before)]).all()
+
+
+def test_a_place_outside_the_body_is_no_law_of_the_clip():
+    case = prepare_case(clip_of(recording(), share=GRID), SETTINGS, Memo(None, ""), lambda *_: None)
+    h = Hypothesis("hidden_contact", np.eye(3), 0, Place((0.2, 0.2, 0.2), 0.002), 0.2, 0.6)
+    outside = Finding(h, 9.0, np.array([0.1, 0.0, 0.0]), np.zeros(3), 20.0, np.zeros(1), 0, 1e-4)
+    assert refit(case, outside, 9.0, case.z).log_evidence == -np.inf
