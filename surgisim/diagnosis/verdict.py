@@ -1,5 +1,7 @@
 """From fits to a verdict: probabilities, intervals, held-out errors, and what is said in words."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.special import expit
 
@@ -22,48 +24,77 @@ RUNNERS, PLACEBOS = 4, 3
 """Other laws that an effect lists, and placebos that are tried where the engine breaks down with one."""
 
 
+@dataclass(frozen=True)
+class Judgement:
+    """What is said of a recording, before it is written down."""
+
+    verdict: str
+    accepted: list
+    """Laws that say something, best first."""
+    chances: dict[str, float]
+    effects: list[dict]
+    explained: float
+    """Share of what physics could explain."""
+    after: np.ndarray
+    """Displacement of the points with what is named [m], (K, T, 3)."""
+    noise: Noise
+    shares: dict[str, float | None]
+
+    @property
+    def named(self) -> bool:
+        return self.verdict in ("named", "equivalence class")
+
+
+def judged(case, laws, refits, second, bend) -> Judgement:
+    """Where something is detected. refits: best first; second: another effect and its log evidence."""
+    chances, first = probabilities(laws, refits, True), refits[0]
+    total = max(explainable(bend), *(r.gain for r in refits), 1e-9)
+    accepted, explained = [first], first.gain / total
+    if second is not None and pays(case, bend, first, *second):
+        accepted.append(second[0])
+        explained = min((first.gain + second[0].gain) / total, 1.0)
+    alike = [r for r in refits[1:] if _cos(case, first, r) > calibration.ALIKE and chances[r.term] > 0.1]
+    after = together(case, accepted)
+    noise = noise_beside(case, after)
+    shares = {
+        "gained": float(explained),
+        "taken": taken(case, after, noise.sigma),
+        "left": still(case, bend, after),
+        "predicted": predicted(case, after, noise.sigma),
+    }
+    explained = max(shares["gained"], shares["taken"])
+    verdict = "named"
+    if doubtful(first.term, shares):
+        verdict, explained = "unexplained", min(explained, 1 - shares["left"])
+    elif explained < calibration.EXPLAINED or first.log_evidence < calibration.THRESHOLD:
+        verdict = "unexplained"
+    elif alike and chances[first.term] < calibration.SURE:
+        verdict = "equivalence class"
+    # What explains little, or is not believed, is no more probable than that, and all other laws with it.
+    most = 1.0 if verdict != "unexplained" else float(np.clip(explained / 2, 0.0, 0.45))
+    scale = min(1.0, most / max(chances[first.term], 1e-12))
+    chances = {term: scale * chance for term, chance in chances.items()}
+    effects = [_effect(case, r, chances, laws, refits, n) for n, r in enumerate(accepted)]
+    for effect in effects:
+        effect["probability"] = min(effect["probability"], most)
+    if verdict == "unexplained":
+        # What is not believed is not modelled.
+        after = case.base.simulated
+    return Judgement(verdict, accepted, chances, effects, float(explained), after, noise, shares)
+
+
 def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis, Physics, Mismatch]:
     """Everything a diagnosis leaves behind. refits: best first; second: another effect and its log evidence."""
     clip, base = case.clip, case.base
     rng = np.random.default_rng([case.settings.seed, 1])
-    chances = probabilities(laws, refits, detected)
-    total = max(explainable(bend), max([r.gain for r in refits], default=0.0), 1e-9)
-    after = base.simulated.copy()
-    effects, accepted, explained = [], [], 0.0
-    verdict, alike, shares = "nothing detectable", [], {}
     if detected:
-        first = refits[0]
-        explained = first.gain / total
-        accepted = [first]
-        if second is not None and pays(case, bend, first, *second):
-            accepted.append(second[0])
-            explained = min((first.gain + second[0].gain) / total, 1.0)
-        alike = [r for r in refits[1:] if _cos(case, first, r) > calibration.ALIKE and chances[r.term] > 0.1]
-        after = together(case, accepted)
-        noise = noise_beside(case, after)
-        shares = {
-            "gained": float(explained),
-            "taken": taken(case, after, noise.sigma),
-            "left": still(case, bend, after),
-            "predicted": predicted(case, after, noise.sigma),
-        }
-        explained = max(shares["gained"], shares["taken"])
-        verdict = "named"
-        if doubtful(first.term, shares):
-            verdict, explained = "unexplained", min(explained, 1 - shares["left"])
-        elif explained < calibration.EXPLAINED or first.log_evidence < calibration.THRESHOLD:
-            verdict = "unexplained"
-        elif alike and chances[first.term] < calibration.SURE:
-            verdict = "equivalence class"
-        effects = [_effect(case, r, chances, laws, refits, n) for n, r in enumerate(accepted)]
-        if verdict == "unexplained":
-            for effect in effects:
-                effect["probability"] = min(effect["probability"], float(np.clip(explained / 2, 0.0, 0.45)))
+        said_of = judged(case, laws, refits, second, bend)
     else:
-        noise = noise_beside(case, after)
-    named = verdict in ("named", "equivalence class")
-    # What is not believed is not modelled.
-    after = after if named else base.simulated
+        plain = base.simulated
+        nothing = probabilities(laws, refits, False)
+        said_of = Judgement("nothing detectable", [], nothing, [], 0.0, plain, noise_beside(case, plain), {})
+    verdict, effects, chances, named = said_of.verdict, said_of.effects, said_of.chances, said_of.named
+    after, noise, explained = said_of.after, said_of.noise, said_of.explained
     placebo = _placebo(case, refits, laws, rng) if named else None
     fit, held_out = errors(case, after, placebo, noise.sigma)
     z, reach = symptom(clip, noise, residual(case, base.simulated, False, rest_only=False), rng)
@@ -98,7 +129,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
             "log_evidence": float(laws[ranked[0]][0]),
             "nulls": np.round(np.max([n for _, n, _ in laws.values()], 0), 3).tolist(),
             "explainable": float(explainable(bend)),
-            **shares,
+            **said_of.shares,
         },
     )
     mismatch = Mismatch(
@@ -112,7 +143,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         cause_time=np.concatenate([when, np.zeros(clip.frames - clip.until)]),
         phase=clip.phases(),
     )
-    return diagnosis, physics(case, accepted if named else []), mismatch
+    return diagnosis, physics(case, said_of.accepted if named else []), mismatch
 
 
 def noise_beside(case, after: np.ndarray) -> Noise:
