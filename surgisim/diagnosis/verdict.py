@@ -109,7 +109,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         effects[0]["separating_experiment"] = separating(
             clip, base, *pair, case.memo, (refits[0].term, refits[1].term), rng
         )
-    said = _words(case, verdict, refits, effects, explained, laws, z)
+    said = _words(case, verdict, refits, said_of.accepted, effects, explained, laws, z)
     above = detectable(case, laws)
     diagnosis = Diagnosis(
         recording=clip.recording.name,
@@ -337,15 +337,15 @@ def _placebo(case, refits, laws, rng) -> np.ndarray | None:
     return None
 
 
-def _words(case, verdict, refits, effects, explained, laws, z) -> str:
+def _words(case, verdict, refits, accepted, effects, explained, laws, z) -> str:
     if verdict == "nothing detectable":
         return words.nothing(1e-3 * detectable(case, laws)[0])
     if verdict == "unexplained":
         k, t = np.unravel_index(np.argmax(z[:, : case.clip.until]), (len(z), case.clip.until))
         when = f"at {t / case.clip.fps:.2g} s ({PHASES[case.clip.phases()[t]]})"
         return words.unexplained(refits[0].term, 1 - explained, when, case.clip.rest[k].tolist())
-    first = refits[0]
-    said = words.sentence(first.finding.hypothesis, effects[0]["parameters"], explained, first.finding.size)
+    found = zip(accepted, effects, strict=True)
+    said = words.sentence([(r.finding.hypothesis, e["parameters"], r.finding.size) for r, e in found], explained)
     if verdict == "equivalence class":
         said += f" {effects[0]['runners_up'][0]['term']} would look nearly the same."
     return said

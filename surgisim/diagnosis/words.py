@@ -1,5 +1,7 @@
 """Two plain sentences for a verdict."""
 
+from collections.abc import Sequence
+
 from surgisim.diagnosis.hypothesis import Hypothesis
 
 SAYS = {
@@ -22,8 +24,20 @@ SAYS = {
 }  # fmt: skip
 
 
-def sentence(h: Hypothesis, parameters: dict[str, dict], gained: float, size: float) -> str:
-    """What is seen, and what naming it gains."""
+def sentence(found: Sequence[tuple[Hypothesis, dict[str, dict], float]], gained: float) -> str:
+    """What is seen, and what naming it gains; found: laws, their parameters, and their sizes [m]."""
+    told = [(*_told(h, parameters), 1e3 * size) for h, parameters, size in found]
+    seen = ", and that ".join(f"{what} ({size:.2g} mm RMS)" for what, _, size in told)
+    added = " and ".join(law for _, law, _ in told)
+    removes = "removes" if len(told) == 1 else "together remove"
+    return (
+        f"Beside its simulation the recording shows that {seen}. "
+        f"Adding {added} {removes} {100 * gained:.0f} % of the misfit that physics can explain."
+    )
+
+
+def _told(h: Hypothesis, parameters: dict[str, dict]) -> tuple[str, str]:
+    """What a law makes tissue do, and what it is."""
     seen, law = SAYS[h.term]
     where = "" if h.place is None else f"near ({', '.join(f'{1e3 * c:.0f}' for c in h.place.center)}) mm"
     first = next(iter(parameters.items()), None)
@@ -36,10 +50,7 @@ def sentence(h: Hypothesis, parameters: dict[str, dict], gained: float, size: fl
     said = seen.format(
         where=where, onset=_moment(h.onset), end=_moment(h.end), less="more" if softer else "less",
     ).replace("  ", " ")  # fmt: skip
-    return (
-        f"Beside its simulation the recording shows that {said} ({1e3 * size:.2g} mm RMS). "
-        f"Adding {law.format(amount=amount)} removes {100 * gained:.0f} % of the misfit that physics can explain."
-    )
+    return said, law.format(amount=amount)
 
 
 def nothing(above: float) -> str:

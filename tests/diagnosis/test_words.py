@@ -1,0 +1,27 @@
+"""What is named is said in two sentences."""
+
+import numpy as np
+
+from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.words import sentence
+from surgisim.physics.place import Place
+
+PUSH = Hypothesis("hidden_contact", np.eye(3), 0, Place((-0.022, -0.007, 0.003), 0.003), 0.48, 1.2)
+STRANDS = Hypothesis("fibre", np.eye(1), 1, None)
+
+
+def of(name, value, unit):
+    return {name: {"value": value, "low": 0.8 * value, "high": 1.2 * value, "unit": unit}}
+
+
+def test_one_law_is_said_with_its_place_and_its_number():
+    said = sentence([(PUSH, of("force", 0.2, "N"), 7e-4)], 0.93)
+    assert "pushes the tissue near (-22, -7, 3) mm from 0.48 s to 1.2 s (0.7 mm RMS)" in said
+    assert "a push there (force = 0.2 N, 0.16 to 0.24) removes 93 %" in said
+
+
+def test_two_laws_are_both_said():
+    said = sentence([(PUSH, of("force", 0.2, "N"), 7e-4), (STRANDS, of("k1", 4e3, "Pa"), 3e-4)], 0.98)
+    assert "one direction (0.3 mm RMS)" in said
+    assert "strands in that direction (k1 = 4e+03 Pa, 3.2e+03 to 4.8e+03) together remove 98 %" in said
+    assert said.count(". ") == 1
