@@ -32,6 +32,8 @@ SLOWER = 8
 without memory, tissue that relaxes looks viscous without bound, and its runs would take minutes each."""
 SCAN = (-1.0, -0.35, 0.3, 1.0)
 """Where the descent may start, in logarithms of E and of eta / E away from START."""
+STIFFER = np.log(3.0)
+"""Step of log E where the body to begin with is torn apart."""
 DESCENTS = 8
 """Steps of it at most."""
 SAFETY, BOLD = 0.8, 1.2
@@ -88,7 +90,12 @@ def fit_base(
     for iteration in range(rounds + 1):
         last = iteration == rounds
         say(f"base, run {iteration + 1}: E {np.exp(x[0]):.0f} Pa, nu {x[1]:.3f}, eta {np.exp(x[0] + x[2]):.2f} Pa s")
-        drive, run = simulate(prepared, clip, x, memo, clip.frames if last else until)
+        frames = clip.frames if last else until
+        x, (drive, run) = (
+            _standing(prepared, clip, x, memo, frames)
+            if iteration == 0
+            else (x, simulate(prepared, clip, x, memo, frames))
+        )
         simulated = carried(carry, run)
         near = tangent(prepared, values_of(x), drive, run, clip.rest, until)
         around = _Around(
@@ -128,11 +135,16 @@ class _Around:
         result[:, first + 1 : last + 1] = seen
         return result + (y[1] - self.x[1]) * self.by_poisson
 
-    def left(self, y: np.ndarray) -> np.ndarray:
-        """Whitened residual, (N,)."""
-        return self.whiten(self.clip.moved[:, : self.clip.until] - self.tracks(y))
+    def left(self, y: np.ndarray) -> np.ndarray | None:
+        """Whitened residual, (N,); None where tissue like that is torn apart."""
+        try:
+            return self.whiten(self.clip.moved[:, : self.clip.until] - self.tracks(y))
+        except Breakdown:
+            return None
 
-    def cost(self, y: np.ndarray, left: np.ndarray) -> float:
+    def cost(self, y: np.ndarray, left: np.ndarray | None) -> float:
+        if left is None:
+            return np.inf
         return float(self.space.gram(left[:, None], left[:, None])[0, 0] + (((y - START) / SPREAD) ** 2).sum())
 
     def slopes(self, y: np.ndarray) -> np.ndarray:
@@ -148,7 +160,7 @@ class _Around:
     def start(self) -> np.ndarray:
         """The best of a few stiffnesses and viscosities: a ring-down misfits by whole periods."""
         tries = [bounded(self.x + np.array([e, 0.0, lag]), self.clip) for e in SCAN for lag in SCAN]
-        return min(tries, key=lambda y: self.cost(y, self.left(y)))
+        return min([self.x, *tries], key=lambda y: self.cost(y, self.left(y)))
 
     def descend(self, y: np.ndarray, say: Callable[[str], None]) -> np.ndarray:
         """Levenberg-Marquardt from y."""
@@ -174,6 +186,18 @@ class _Around:
             if done:
                 return y
         return y
+
+
+def _standing(prepared: Prepared, clip: Clip, x: np.ndarray, memo: Memo, frames: int):
+    """The first of ever stiffer bodies that is not torn apart: its numbers, drive and run."""
+    while True:
+        try:
+            return x, simulate(prepared, clip, x, memo, frames)
+        except Breakdown:
+            stiffer = bounded(x + np.array([STIFFER, 0.0, 0.0]), clip)
+            if stiffer[0] == x[0]:
+                raise
+            x = stiffer
 
 
 def carried(carry, run: Run) -> np.ndarray:

@@ -22,7 +22,7 @@ QUIET = 1.6
 """Times the step of the quietest fifth of the frames, below which a frame counts as quiet where nothing is gripped."""
 MOST = 120
 """Points that are used at most; neighbours' errors are alike, so more of them tell little more."""
-LEAST_SEEN = 0.3
+LEAST_SEEN = 0.2
 """Share of the fitted frames in which a point must be seen."""
 
 
