@@ -40,12 +40,11 @@ def _told(h: Hypothesis, parameters: dict[str, dict]) -> tuple[str, str]:
     """What a law makes tissue do, and what it is."""
     seen, law = SAYS[h.term]
     where = "" if h.place is None else f"near ({', '.join(f'{1e3 * c:.0f}' for c in h.place.center)}) mm"
-    first = next(iter(parameters.items()), None)
-    amount = (
-        ""
-        if first is None
-        else f"{first[0]} = {first[1]['value']:.3g} {first[1]['unit']}, {first[1]['low']:.3g} to {first[1]['high']:.3g}"
-    )
+    amount = ""
+    if parameters:
+        name, first = next(iter(parameters.items()))
+        unit = "" if first["unit"] == "1" else f" {first['unit']}"
+        amount = f"{name} = {first['value']:.3g}{unit}, {first['low']:.3g} to {first['high']:.3g}"
     softer = "s" in parameters and parameters["s"]["value"] < 1
     said = seen.format(
         where=where, onset=_moment(h.onset), end=_moment(h.end), less="more" if softer else "less",

@@ -25,3 +25,8 @@ def test_two_laws_are_both_said():
     assert "one direction (0.3 mm RMS)" in said
     assert "strands in that direction (k1 = 4e+03 Pa, 3.2e+03 to 4.8e+03) together remove 98 %" in said
     assert said.count(". ") == 1
+
+
+def test_a_number_without_a_unit_is_said_without_one():
+    softer = Hypothesis("damage", np.eye(1), 1, None)
+    assert "(most = 0.5, 0.4 to 0.6)" in sentence([(softer, of("most", 0.5, "1"), 1e-3)], 1.0)
