@@ -25,8 +25,6 @@ FITTED_MISFIT = 0.03
 """Share of the explained chi square that a law still leaves wrong once the engine has fitted it."""
 ALIKE = 0.85
 """|cos| of whitened signatures beyond which two laws are not told apart."""
-EXPLAINED_WELL = 0.9
-"""Share beyond which no law is tried that only runs of the engine can tell."""
 LITTLE_LEFT = 0.1
 """Share of the explainable misfit beside a first law below which no second one is looked for."""
 SURE = 0.5

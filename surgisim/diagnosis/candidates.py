@@ -47,6 +47,6 @@ def blocks(clip: Clip, base: Base, only: np.ndarray | None = None) -> Parts:
 
 
 def costly(clip: Clip, base: Base, memo: Memo) -> Parts:
-    """What only runs of the engine can tell; tried where nothing else explains enough."""
+    """What only runs of the engine can tell; tried where something is to be told."""
     if clip.body.held.any() and len(clip.motion.radius):
         yield "a gliding base", lambda: memory.gliding(clip, base, memo)

@@ -14,7 +14,7 @@ from surgisim.diagnosis.base import BOLD, Base, fit_base
 from surgisim.diagnosis.candidates import Parts, blocks, costly
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.evidence import Finding, by_law, judge
-from surgisim.diagnosis.flexible import flexible
+from surgisim.diagnosis.flexible import Flexible, flexible
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
 from surgisim.diagnosis.locate import worst
@@ -23,6 +23,7 @@ from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
 from surgisim.diagnosis.refine import refined
 from surgisim.diagnosis.sharpen import finer
+from surgisim.diagnosis.together import together
 from surgisim.recordings.recording import Recording
 
 Progress = Callable[[float, float, str], None]
@@ -85,19 +86,21 @@ def diagnose(
     laws = by_law(findings)
     bend = flexible(case.clip, case.whiten, case.space, case.z, case.nulls)
     detected = max(entry[0] for entry in laws.values()) > threshold(laws, settings)
-    if detected and max(f.gain for f in findings) < calibration.EXPLAINED_WELL * verdict.explainable(bend):
+    if detected:
         parts = costly(clip, case.base, memo)
         findings += search(case, case.z, case.nulls, lambda s, text: progress(0.62, 1, text), parts)
         laws = by_law(findings)
     ranked, refits = sorted(laws, key=lambda term: -laws[term][0]), []
     if detected:
         case, refits = compete(case, laws, ranked, progress)
-    second = None
-    if detected and settings.second and verdict.beside(case, bend, refits[:1]) > calibration.LITTLE_LEFT:
-        progress(0.86, 1, f"what {refits[0].term} leaves")
-        second = another(case, refits[0], progress)
-    progress(0.95, 1, "verdict")
-    return verdict.write(case, laws, ranked, refits, second, bend, detected)
+    accepted = None
+    if detected:
+        accepted = together(
+            case, refits[:1] + seconds(case, refits[0], bend, progress), lambda text: progress(0.93, 1, text),
+            free=settings.free > 0 and 2 * fit_of_a_law(case) < settings.budget,
+        )  # fmt: skip
+    progress(0.97, 1, "verdict")
+    return verdict.write(case, laws, ranked, refits, accepted, bend)
 
 
 def compete(case: Case, laws: dict, ranked: list[str], progress: Progress) -> tuple[Case, list[Refit]]:
@@ -231,13 +234,17 @@ def fit_of_a_law(case: Case) -> float:
 
 
 def freed(case: Case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
-    """The same law with everything about it free; as it was where that gains nothing."""
-    found = refined(case, z, (one.finding.hypothesis, one.amplitude), one.response, say)
-    if found is None or found.gain <= one.gain:
+    """The same law with everything about it free; as it was where the engine breaks down.
+
+    Its gain is never less than before: there the base moved along its tangent, which takes more than tissue gives.
+    """
+    found = refined(case, z, [(one.finding.hypothesis, one.amplitude)], one.response, say)
+    if found is None:
         return one
-    finding = replace(one.finding, hypothesis=found.hypothesis)
-    evidence = one.log_evidence + 0.5 * (found.gain - one.gain)
-    return Refit(finding, found.amplitude, found.response, found.gain, evidence, found.x, tuple(found.draws))
+    (hypothesis, amplitude), gain = found.laws[0], max(found.gain, one.gain)
+    evidence = one.log_evidence + 0.5 * (gain - one.gain)
+    finding = replace(one.finding, hypothesis=hypothesis)
+    return Refit(finding, amplitude, found.response, gain, evidence, found.x, tuple(found.draws[0]))
 
 
 def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:
@@ -250,6 +257,15 @@ def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:
             found = judge(block, case.whiten, case.space, residual, -1, seen)
             best = max([best, *(f for f in found if f.hypothesis.term == best.hypothesis.term)], key=lambda f: f.gain)
     return best, evidence + 0.5 * (best.gain - findings[0].gain)
+
+
+def seconds(case: Case, first: Refit, bend: Flexible, progress: Progress) -> list[Refit]:
+    """What is named beside the first law: one law or none."""
+    if not case.settings.second or verdict.beside(case, bend, [first]) <= calibration.LITTLE_LEFT:
+        return []
+    progress(0.86, 1, f"what {first.term} leaves")
+    found = another(case, first, progress)
+    return [found[0]] if found is not None and verdict.pays(case, bend, first, *found) else []
 
 
 def another(case: Case, first: Refit, progress: Progress) -> tuple[Refit, float] | None:

@@ -8,6 +8,8 @@ from surgisim.physics.place import Place
 
 RISE = 0.12
 """How long a load takes to come or leave [s]."""
+SETS_IN = 0.3
+"""How long a rhythm takes to set in [s]."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from surgisim.artifacts.motion import Motion
 from surgisim.diagnosis.base import SAFETY, Base, boldly, carried
 from surgisim.diagnosis.clip import Clip
-from surgisim.diagnosis.hypothesis import RISE, Hypothesis
+from surgisim.diagnosis.hypothesis import RISE, SETS_IN, Hypothesis
 from surgisim.diagnosis.memo import Memo
 from surgisim.mpm.closing import follow
 from surgisim.mpm.setup import Prepared, Values
@@ -25,6 +25,10 @@ NEVER = 59.0
 """An end after every clip [s]."""
 IMPOSSIBLE = (Breakdown, Misplaced)
 """Tissue torn apart, or a place outside the body: not a law of this clip."""
+
+
+class Clash(ValueError):
+    """Two laws that need the same term: a body has each once."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,16 @@ def law_of(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> Law:
     return Law({"active_contraction": {"tension": a, **_waves(h, clip)}}, {})
 
 
+def joined(laws: Sequence[Law]) -> Law:
+    """All of them at once. Raises Clash where two need the same term."""
+    values, places, motion = {}, {}, None
+    for law in laws:
+        if set(law.values) & set(values) or (motion is not None and law.motion is not None):
+            raise Clash(f"{sorted(law.values)} and {sorted(values)}")
+        values, places, motion = values | law.values, places | law.places, law.motion or motion
+    return Law(values, places, motion)
+
+
 FORCES = (
     "hidden_contact",
     "added_mass",
@@ -104,18 +118,14 @@ def beside(h: Hypothesis, amplitude: np.ndarray, stiffer: float) -> tuple[Hypoth
 
 
 def _waves(h: Hypothesis, clip: Clip) -> dict[str, float]:
-    """The rhythm of a contraction. The law counts from what the first frame holds already (`- w(0)`): waves that set in
-    later must find every part at rest in that frame, waves from the start find it in their midst."""
+    """The rhythm of a contraction, counted from long before every part's first wave; `begin` is when it sets in."""
     yaw, pitch = angles(h.about["axis"])
     period, slowness = h.about["period"], h.about["period"] / h.about["wavelength"]
     onset = -h.about["phase"] / (2 * np.pi) * period
     along = clip.body.rest.astype(float) @ np.asarray(h.about["axis"], float)
-    earliest = slowness * (along.min() - along.mean())
-    if h.onset:
-        onset += period * math.ceil((max(h.onset - period / 2, -earliest) - onset) / period)
-    else:
-        onset -= period * math.ceil((onset + slowness * (along.max() - along.mean())) / period)
-    return {"onset": onset, "period": period, "duty": 0.5, "slowness": slowness, "yaw": yaw, "pitch": pitch}
+    onset -= period * math.ceil((onset + slowness * (along.max() - along.mean())) / period)
+    rhythm = {"onset": onset, "period": period, "duty": 0.5, "slowness": slowness}
+    return {**rhythm, "yaw": yaw, "pitch": pitch, "begin": h.onset + SETS_IN / 2}
 
 
 def stiffness_of(amplitude: float) -> float:
@@ -301,4 +311,4 @@ def _plain(value):
     return None if value is None else float(value)
 
 
-__all__ = ["Law", "angles", "described", "lag", "law_of", "respond"]
+__all__ = ["Law", "angles", "described", "joined", "lag", "law_of", "respond"]

@@ -20,8 +20,8 @@ YIELDS = (0.05, 0.08, 0.12, 0.17, 0.24)
 TEARS = (0.05, 0.08, 0.12, 0.17, 0.24)
 MOST = 0.8
 """Damage that is never exceeded, where a fit begins."""
-CAPS = (0.15, 0.35, 0.6)
-"""Friction that a base is tried with, over the largest traction it bears."""
+CAPS = (0.015, 0.03, 0.05, 0.09, 0.16, 0.35)
+"""Friction that a base is tried with, over the largest traction it bears: that is found in few places, below a grip."""
 SMALL = 1e-3
 STEPS = 2
 """Steps between two frames in which a memory advances."""

@@ -1,4 +1,4 @@
-"""A law fitted with everything about it free: how strong, where, how wide, when, how fast, along which direction.
+"""Laws fitted with everything about them free: how strong, where, how wide, when, how fast, along which direction.
 
 What the search found is the start. The engine itself runs at every trial (Levenberg-Marquardt; forward differences at
 first, then Broyden's secants), so that what the tangent cannot show, a lump so stiff that it moves as one, counts. The
@@ -8,7 +8,7 @@ nuisances stay free through the metric. Each number has a prior around its start
 Broyden, A class of methods for solving nonlinear simultaneous equations, Mathematics of Computation 19 (1965).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from surgisim.diagnosis.base import SPREAD, START, bounded
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import APART, scale
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import IMPOSSIBLE, Law, beside, law_of, respond
+from surgisim.diagnosis.laws import IMPOSSIBLE, Law, beside, joined, law_of, respond
 from surgisim.diagnosis.metric import metric
 from surgisim.estimation.trial import at_once
 
@@ -42,42 +42,51 @@ DRAWS = 200
 """From the posterior, which intervals are read off."""
 
 
+Start = tuple[Hypothesis, np.ndarray]
+"""A hypothesis and its amplitude, (H,)."""
+
+
 @dataclass(frozen=True)
 class Refined:
-    hypothesis: Hypothesis
-    amplitude: np.ndarray
-    draws: list[tuple[Hypothesis, np.ndarray]]
-    """The same law and its amplitude, drawn from the posterior."""
+    laws: list[Start]
+    draws: list[list[Start]]
+    """The same laws, drawn from their posterior: a list for each."""
     x: np.ndarray
     """The base that goes with it, (3,)."""
     response: np.ndarray
-    """What the law and its own base add to the base over the whole clip [m], (K, T, 3)."""
+    """What the laws and their own base add to the base over the whole clip [m], (K, T, 3)."""
     gain: float
     """Of twice the log posterior over nothing."""
 
 
 def refined(
-    case, z: np.ndarray, start: tuple[Hypothesis, np.ndarray], response: np.ndarray, say: Callable[[str], None]
+    case, z: np.ndarray, starts: Sequence[Start], response: np.ndarray, say: Callable[[str], None], base_at=None
 ) -> Refined | None:
-    """The best law near `start`, a hypothesis and its amplitude (H,), whose response [m], (K, T, 3), is known.
+    """The best laws near `starts`, whose response together [m], (K, T, 3), is known.
 
-    case: a `diagnose.Case`; z: whitened residual of the base, (N,). None where the engine breaks down at the start.
+    case: a `diagnose.Case`; z: whitened residual of the base, (N,); base_at: a base to begin with as well, (3,). None
+    where the engine breaks down at the start.
     """
-    h, amplitude = start
     clip, base, whiten, until = case.clip, case.base, case.whiten, case.clip.until
     workers = case.settings.workers if clip.device == "cpu" else 1
-    own = _knobs(h, amplitude, clip)
+    knobs = [_knobs(h, amplitude, clip) for h, amplitude in starts]
+    own = sum(len(k) for k in knobs)
+    name = " and ".join(h.term for h, _ in starts)
     # The base is searched by the engine: its slopes leave the metric.
     space = metric(np.delete(case.space.columns, case.slopes, axis=1))
 
-    def turned(x: np.ndarray) -> tuple[Hypothesis, np.ndarray, np.ndarray]:
-        there = bounded(base.x + x[len(own) :] * SPREAD, clip)
-        # Only what pushes or resists over the tissue's own stiffness shows.
-        return *beside(*_turned(h, amplitude, own, x[: len(own)], clip), float(np.exp(there[0] - base.x[0]))), there
+    def turned(x: np.ndarray) -> tuple[list[Start], np.ndarray]:
+        there, at, found = bounded(base.x + x[own:] * SPREAD, clip), 0, []
+        for (h, amplitude), mine in zip(starts, knobs, strict=True):
+            here = _turned(h, amplitude, mine, x[at : at + len(mine)], clip)
+            # Only what pushes or resists over the tissue's own stiffness shows.
+            found.append(beside(*here, float(np.exp(there[0] - base.x[0]))))
+            at += len(mine)
+        return found, there
 
     def law_at(x: np.ndarray) -> tuple[Law, np.ndarray]:
-        *law, there = turned(x)
-        return law_of(*law, clip), there
+        laws, there = turned(x)
+        return joined([law_of(h, amplitude, clip) for h, amplitude in laws]), there
 
     def left(x: np.ndarray, _worker: int = 0) -> np.ndarray | None:
         try:
@@ -92,8 +101,11 @@ def refined(
 
     likely = cho_solve(case.space.factor, case.space.seen_through(z - whiten(response[:, :until])))[case.slopes]
     usual = (np.array([START[0], base.x[1], START[2]]) - base.x) / SPREAD
-    begins = [np.concatenate([np.zeros(len(own)), by]) for by in (0 * usual, np.clip(likely, -2, 2), usual)]
-    say(f"{h.term} with all its numbers free")
+    bases = [0 * usual, np.clip(likely, -2, 2), usual]
+    if base_at is not None:
+        bases.append((base_at - base.x) / SPREAD)
+    begins = [np.concatenate([np.zeros(own), by]) for by in bases]
+    say(f"{name} with all numbers free")
     residuals = at_once(left, begins, workers)
     k = int(np.argmin([cost(x, r) for x, r in zip(begins, residuals, strict=True)]))
     x, r = begins[k], residuals[k]
@@ -102,7 +114,7 @@ def refined(
     nothing, best, damping = float(case.space.gram(z[:, None], z[:, None])[0, 0]), cost(x, r), 0.1
     J, fresh, normal = None, 0, np.eye(len(x))
     for n in range(ROUNDS):
-        say(f"{h.term} with all its numbers free, round {n + 1} of at most {ROUNDS}")
+        say(f"{name} with all numbers free, round {n + 1} of at most {ROUNDS}")
         if J is None:
             sides = at_once(left, [x + STEP * e for e in np.eye(len(x))], workers)
             J = np.stack([np.zeros_like(r) if s is None else (r - s) / STEP for s in sides], 1)
@@ -133,13 +145,12 @@ def refined(
         response = respond(clip, replace(base, x=there), law, case.memo) - base.simulated
     except IMPOSSIBLE:
         return None
-    found, strength, _ = turned(x)
     # As uncertain as the verdict takes evidence to be: signatures are not exact.
     heat = calibration.TEMPERATURE + calibration.MISFIT * max(nothing - best, 0.0)
     spread = np.linalg.inv((normal - np.eye(len(x))) / heat + np.eye(len(x)))
     rng = np.random.default_rng([case.settings.seed, 3])
-    draws = [turned(near)[:2] for near in rng.multivariate_normal(x, spread, DRAWS)]
-    return Refined(found, strength, draws, there, response, nothing - best)
+    draws = [turned(near)[0] for near in rng.multivariate_normal(x, spread, DRAWS)]
+    return Refined(turned(x)[0], [list(d) for d in zip(*draws, strict=True)], there, response, nothing - best)
 
 
 def _knobs(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> list[tuple[str, object, float]]:
@@ -156,7 +167,7 @@ def _knobs(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> list[tuple[str, 
             knobs.append(("extent", None, EXTENT))
         else:
             knobs.append(("depth", None, 0.5 * APART * scale(clip)))
-    moving = h.term in ("hidden_contact", "added_mass", "gravity", "tool_slip")
+    moving = h.term in ("hidden_contact", "added_mass", "gravity", "tool_slip", "active_contraction")
     names = ("onset",) if h.term == "tool_slip" else ("onset", "end")
     knobs += [(name, None, MOMENT) for name in names if moving and getattr(h, name) is not None]
     # Damage has a rate of one, which its amplitude scales.

@@ -1,28 +1,61 @@
 """Base and named laws predicted together: with a law in place, the base no longer has to make up for it."""
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_solve
 
 from surgisim.diagnosis.base import SPREAD, bounded, carried, simulate
 from surgisim.diagnosis.errors import rms
-from surgisim.diagnosis.laws import law_of, respond
+from surgisim.diagnosis.laws import Clash, joined, law_of, respond
+from surgisim.diagnosis.refine import refined
 from surgisim.mpm.simulator import Breakdown
 
 
-def together(case, refits) -> np.ndarray:
-    """Displacement of the points with these laws over the whole clip [m], (K, T, 3).
+@dataclass(frozen=True)
+class Together:
+    refits: list
+    """Best first, with the numbers that they have beside one another; a response stays that of its law alone."""
+    moved: np.ndarray
+    """Displacement of the points with all of them over the whole clip [m], (K, T, 3)."""
 
-    The base moves to where the metric puts it once the laws' responses are taken off, and the engine runs both again.
-    Where that is no better on the fitted frames, or breaks down, base and responses are added as they are.
+
+def together(case, refits: list, say: Callable[[str], None], *, free: bool) -> Together:
+    """One law as it was fitted; two fitted anew with all numbers of both and the base free, where `free`.
+
+    Where that cannot be, because both need the same term, the base moves to where the metric puts it once the laws'
+    responses are taken off, and the engine runs again. What is no better than base and responses as they are, added,
+    on the fitted frames is not taken.
     """
-    clip, base, until = case.clip, case.base, case.clip.until
-    plain = base.simulated + sum(r.response for r in refits)
-    first = refits[0].x
-    if len(refits) == 1 and first is not None:
+    plain = Together(refits, case.base.simulated + sum(r.response for r in refits))
+    if len(refits) == 1 and refits[0].x is not None:
         # Law and base were fitted in the same runs.
         return plain
+    tried = [plain, *(_freed(case, refits, say) if free and len(refits) > 1 else [])]
+    if len(tried) == 1:
+        tried += _moved(case, refits)
+    return min(tried, key=lambda t: rms(case, t.moved)[0])
+
+
+def _freed(case, refits: list, say) -> list[Together]:
+    starts = [(r.finding.hypothesis, r.amplitude) for r in refits]
+    try:
+        joined([law_of(*start, case.clip) for start in starts])
+    except Clash:
+        return []
+    found = refined(case, case.z, starts, sum(r.response for r in refits), say, refits[0].x)
+    if found is None:
+        return []
+    mine = [
+        replace(r, finding=replace(r.finding, hypothesis=h), amplitude=amplitude, x=found.x, draws=tuple(draws))
+        for r, (h, amplitude), draws in zip(refits, found.laws, found.draws, strict=True)
+    ]
+    return [Together(mine, case.base.simulated + found.response)]
+
+
+def _moved(case, refits: list) -> list[Together]:
+    clip, base, until, first = case.clip, case.base, case.clip.until, refits[0].x
     left = case.z - sum(case.whiten(r.response[:, :until]) for r in refits)
     likely = cho_solve(case.space.factor, case.space.seen_through(left))[case.slopes]
     x = bounded((base.x if first is None else first) + likely * SPREAD, clip)
@@ -31,7 +64,6 @@ def together(case, refits) -> np.ndarray:
         simulated = carried(base.prepared.simulator.carry(clip.rest), run)
         moved = replace(base, x=x, drive=drive, run=run, simulated=simulated)
         laws = [law_of(r.finding.hypothesis, r.amplitude, clip) for r in refits]
-        both = simulated + sum(respond(clip, moved, law, case.memo) - simulated for law in laws)
+        return [Together(refits, simulated + sum(respond(clip, moved, law, case.memo) - simulated for law in laws))]
     except Breakdown:
-        return plain
-    return both if rms(case, both)[0] < rms(case, plain)[0] else plain
+        return []

@@ -18,7 +18,7 @@ from surgisim.diagnosis.laws import IMPOSSIBLE, described, law_of, respond
 from surgisim.diagnosis.locate import cause, of_places, symptom
 from surgisim.diagnosis.model import base_numbers, physics
 from surgisim.diagnosis.noise import Noise, estimate
-from surgisim.diagnosis.together import together
+from surgisim.diagnosis.together import Together
 
 RUNNERS, PLACEBOS = 4, 3
 """Other laws that an effect lists, and placebos that are tried where the engine breaks down with one."""
@@ -45,16 +45,13 @@ class Judgement:
         return self.verdict in ("named", "equivalence class")
 
 
-def judged(case, laws, refits, second, bend) -> Judgement:
-    """Where something is detected. refits: best first; second: another effect and its log evidence."""
+def judged(case, laws, refits, fitted: Together, bend) -> Judgement:
+    """Where something is detected. refits: best first; fitted: what may be named of them, and what else."""
     chances, first = probabilities(laws, refits, True), refits[0]
     total = max(explainable(bend), *(r.gain for r in refits), 1e-9)
-    accepted, explained = [first], first.gain / total
-    if second is not None and pays(case, bend, first, *second):
-        accepted.append(second[0])
-        explained = min((first.gain + second[0].gain) / total, 1.0)
+    accepted, after = fitted.refits, fitted.moved
+    explained = min(sum(r.gain for r in accepted) / total, 1.0)
     alike = [r for r in refits[1:] if _cos(case, first, r) > calibration.ALIKE and chances[r.term] > 0.1]
-    after = together(case, accepted)
     noise = noise_beside(case, after)
     shares = {
         "gained": float(explained),
@@ -83,12 +80,12 @@ def judged(case, laws, refits, second, bend) -> Judgement:
     return Judgement(verdict, accepted, chances, effects, float(explained), after, noise, shares)
 
 
-def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis, Physics, Mismatch]:
-    """Everything a diagnosis leaves behind. refits: best first; second: another effect and its log evidence."""
+def write(case, laws, ranked, refits, fitted: Together | None, bend) -> tuple[Diagnosis, Physics, Mismatch]:
+    """Everything a diagnosis leaves behind. refits: best first; fitted: of them what may be named, None for nothing."""
     clip, base = case.clip, case.base
     rng = np.random.default_rng([case.settings.seed, 1])
-    if detected:
-        said_of = judged(case, laws, refits, second, bend)
+    if fitted is not None:
+        said_of = judged(case, laws, refits, fitted, bend)
     else:
         plain = base.simulated
         nothing = probabilities(laws, refits, False)
@@ -120,7 +117,7 @@ def write(case, laws, ranked, refits, second, bend, detected) -> tuple[Diagnosis
         missing_phases=missing(clip),
         fit=fit,
         held_out=held_out,
-        unexplained_fraction=float(np.clip(1 - explained, 0, 1)) if detected else 0.0,
+        unexplained_fraction=float(np.clip(1 - explained, 0, 1)) if fitted is not None else 0.0,
         words=said,
         base=base_numbers(base),
         noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(noise).items()}

@@ -8,7 +8,7 @@ import numpy as np
 from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import Block, hats, knots, moments, plane, scale, spread
-from surgisim.diagnosis.hypothesis import RISE, Hypothesis, ease
+from surgisim.diagnosis.hypothesis import RISE, SETS_IN, Hypothesis, ease
 from surgisim.diagnosis.tangent import piola
 from surgisim.physics.catalogue import choose
 
@@ -126,7 +126,7 @@ def contracting(
             states = near.at_states(loads)
             for period, shift, start in itertools.product(periods, shifts, starts):
                 courses = _wave(2 * np.pi * time / period + shift)
-                up = ease((time - start) / 0.3)
+                up = ease((time - start) / SETS_IN)
                 columns.append(sum(near.over_time(states[:, m], up * courses[m]) for m in range(5)))
                 found.append(
                     {"period": period, "wavelength": wave, "axis": a, "phase": shift, "turn": turn, "start": start}

@@ -6,8 +6,9 @@ from planted import GRID, recording
 
 from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import SPHERE, law_of, stiffness_of
+from surgisim.diagnosis.laws import SPHERE, Clash, joined, law_of, stiffness_of
 from surgisim.physics.catalogue import choose
+from surgisim.physics.place import Place
 from surgisim.physics.terms.active_contraction import spread, twin_wave
 
 
@@ -26,14 +27,15 @@ def test_waves_keep_their_phase_and_start_from_rest(clip, start):
     about = {"period": 1.2, "wavelength": 0.04, "axis": np.array([0.8, 0.6, 0.0]), "phase": 2.0}
     h = Hypothesis("active_contraction", np.ones((1, 1)), 1, None, start, None, about)
     numbers = law_of(h, np.array([200.0]), clip).values["active_contraction"]
-    numbers.pop("tension")
     rest = clip.body.rest.astype(float)
-    onset = spread(rest, **numbers)["onset"]
+    onset, begin = spread(rest, **numbers)["onset"], numbers["begin"]
     late = 6.0
     turns = 2 * np.pi * late / 1.2 + 2.0 - 2 * np.pi / 0.04 * ((rest - rest.mean(0)) @ about["axis"])
-    assert np.allclose(twin_wave(late, onset, 1.2, 0.5), np.maximum(np.sin(turns), 0) ** 2, atol=1e-6)
-    before = twin_wave(0.0, onset, 1.2, 0.5)
-    assert (before == 0).all() if start else before.max() > 0.5
+    assert np.allclose(twin_wave(late, onset, 1.2, 0.5, begin), np.maximum(np.sin(turns), 0) ** 2, atol=1e-6)
+    assert twin_wave(start, onset, 1.2, 0.5, begin).max() < 0.03
+    soon = start + 0.3
+    turns = turns + 2 * np.pi * (soon - late) / 1.2
+    assert np.allclose(twin_wave(soon, onset, 1.2, 0.5, begin), np.maximum(np.sin(turns), 0) ** 2, atol=0.03)
 
 
 def test_a_push_keeps_its_direction(clip):
@@ -42,3 +44,15 @@ def test_a_push_keeps_its_direction(clip):
     law = law_of(h, force, clip).values["gravity"]
     assert [law[k] for k in "xyz"] == pytest.approx(force.tolist())
     assert set(choose(["gravity"])["gravity"].params) == {*law}
+
+
+def test_two_laws_are_joined_unless_a_body_would_need_one_twice(clip):
+    down, here = np.array([0.0, 0.0, -1.0]), Place((0.0, 0.0, 0.01), 0.003)
+    weight = law_of(Hypothesis("added_mass", np.eye(1), 1, here, 0.3, None, {"down": down}), np.array([0.05]), clip)
+    push = law_of(Hypothesis("hidden_contact", np.eye(3), 0, here, 0.3, 0.9), np.array([0.0, 0.1, 0.0]), clip)
+    stiffer = law_of(Hypothesis("stiffening", np.eye(1), 1), np.array([2.0]), clip)
+    both = joined([push, stiffer])
+    assert set(both.values) == {"hidden_contact", "stiffening"}
+    assert both.places == {"hidden_contact": here}
+    with pytest.raises(Clash):
+        joined([weight, push])
