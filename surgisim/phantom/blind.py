@@ -28,6 +28,8 @@ NEAR = 0.10
 """How near the fine run's ratio must come to the wanted one; otherwise it is run again."""
 FINE_RUNS = 4
 """At most."""
+WEAKER = 0.8
+"""Times the strength of two effects that tissue does not bear at once, again and again until it does."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +108,11 @@ def _with_effects(settings, scene, names, plain, free, progress) -> tuple[np.nda
     aims = tuple(_aim(settings, scene, name, rng, measure) for name in names)
     # Fine elements answer a little differently from coarse ones; one factor for all effects mends that.
     wanted = _within_reach(aims[0]) if len(aims) == 1 else measure(*(a.hidden for a in aims))
+    while math.isinf(wanted):
+        # Each alone is borne, but not both.
+        weaker = [_times(a.hidden, WEAKER) for a in aims]
+        aims = tuple(Aim(h, a.asked, measure(h)) for h, a in zip(weaker, aims, strict=True))
+        wanted = measure(*weaker)
     runs: dict[float, tuple[np.ndarray, tuple[Hidden, ...]]] = {}
 
     def measure_fine(factor: float) -> float:
