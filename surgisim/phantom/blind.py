@@ -107,12 +107,9 @@ def _with_effects(settings, scene, names, plain, free, progress) -> tuple[np.nda
 
     aims = tuple(_aim(settings, scene, name, rng, measure) for name in names)
     # Fine elements answer a little differently from coarse ones; one factor for all effects mends that.
-    wanted = _within_reach(aims[0]) if len(aims) == 1 else measure(*(a.hidden for a in aims))
-    while math.isinf(wanted):
-        # Each alone is borne, but not both.
-        weaker = [_times(a.hidden, WEAKER) for a in aims]
-        aims = tuple(Aim(h, a.asked, measure(h)) for h, a in zip(weaker, aims, strict=True))
-        wanted = measure(*weaker)
+    wanted = _within_reach(aims[0])
+    if len(aims) > 1:
+        aims, wanted = at_once(aims, measure)
     runs: dict[float, tuple[np.ndarray, tuple[Hidden, ...]]] = {}
 
     def measure_fine(factor: float) -> float:
@@ -158,6 +155,14 @@ def _aim(settings: Invent, scene: Scene, name: str, rng: np.random.Generator, me
         lambda magnitude: measure(hidden.scaled(magnitude)), asked, start=effect.start, most=effect.most
     )
     return Aim(hidden.scaled(found.magnitude), asked, found.ratio)
+
+
+def at_once(aims: tuple[Aim, ...], measure: Callable[..., float]) -> tuple[tuple[Aim, ...], float]:
+    """Effects as strong as tissue bears them together, and the ratio that they give; `measure` says inf beyond that."""
+    while math.isinf(wanted := measure(*(a.hidden for a in aims))):
+        weaker = [_times(a.hidden, WEAKER) for a in aims]
+        aims = tuple(Aim(h, a.asked, measure(h)) for h, a in zip(weaker, aims, strict=True))
+    return aims, wanted
 
 
 def _within_reach(aim: Aim) -> float:

@@ -4,6 +4,7 @@ import dataclasses
 import hashlib
 import io
 import json
+import math
 from collections import Counter
 
 import numpy as np
@@ -11,8 +12,8 @@ import pytest
 
 from surgisim.config.invent import Invent
 from surgisim.phantom import nuisance, seal
-from surgisim.phantom.blind import invent, name_of
-from surgisim.phantom.effect import catalogue
+from surgisim.phantom.blind import Aim, at_once, invent, name_of
+from surgisim.phantom.effect import Hidden, catalogue
 from surgisim.phantom.mixture import concealed
 from surgisim.phantom.scene import draw
 from surgisim.phantom.snr import scaled
@@ -185,3 +186,17 @@ def test_every_part_of_an_effect_can_be_told_in_json():
         assert json.loads(json.dumps(told))["name"] == name
         assert hidden.onset is None or 0 <= hidden.onset < scene.end_of_fit
         assert hidden.end is None or hidden.onset < hidden.end <= scene.end_of_fit
+
+
+def test_two_effects_that_tissue_does_not_bear_at_once_are_weaker():
+    aims = (Aim(Hidden("gravity", 8.0), 3.0, 3.0), Aim(Hidden("tool_slip", 0.9), 3.0, 3.0))
+
+    def measure(*hidden):
+        load = sum(h.magnitude / (8.0 if h.name == "gravity" else 0.9) for h in hidden)
+        return math.inf if load > 1.5 else load
+
+    weaker, ratio = at_once(aims, measure)
+    assert ratio == pytest.approx(2 * 0.8**2)
+    assert [a.hidden.magnitude for a in weaker] == pytest.approx([8.0 * 0.8**2, 0.9 * 0.8**2])
+    assert [a.alone for a in weaker] == pytest.approx([0.8**2, 0.8**2])
+    assert at_once(weaker, measure) == (weaker, ratio)
