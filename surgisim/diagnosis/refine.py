@@ -60,8 +60,9 @@ class Refined:
 
 
 def refined(
-    case, z: np.ndarray, starts: Sequence[Start], response: np.ndarray, say: Callable[[str], None], base_at=None
-) -> Refined | None:
+    case, z: np.ndarray, starts: Sequence[Start], response: np.ndarray, say: Callable[[str], None],
+    base_at: np.ndarray | None = None,
+) -> Refined | None:  # fmt: skip
     """The best laws near `starts`, whose response together [m], (K, T, 3), is known.
 
     case: a `diagnose.Case`; z: whitened residual of the base, (N,); base_at: a base to begin with as well, (3,). None
