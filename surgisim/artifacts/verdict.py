@@ -132,7 +132,7 @@ def _effect(raw: Any, where: str) -> Effect:
 def _candidate(raw: Any, where: str) -> Candidate:
     if not isinstance(raw, dict) or not isinstance(raw.get("term"), str):
         raise Problem(f"{where}: a law's name under 'term' is wanted. Diagnose anew.")
-    numbers = (raw.get(key) for key in ("log_evidence", "cos", "held_out"))
+    numbers = (raw.get(key) for key in ("log_evidence", "cos", "held_out_rms"))
     evidence, cos, rms = (None if x is None else float(x) for x in numbers)
     return Candidate(raw["term"], _place(raw.get("place"), where)[0], evidence, _probability(raw, where), cos, rms)
 

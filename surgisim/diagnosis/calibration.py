@@ -20,7 +20,9 @@ CLOSE = 0.5
 SLACK = 120.0
 """chi square that a smooth field gains where nothing is hidden, beyond simulated nulls: the simulator's error."""
 SECOND = 0.5
-"""Share of what a first law leaves of it that a second law must explain."""
+"""Share of what a first law leaves of it that a second law must explain, both fitted together."""
+RUNNER_UP = 0.9
+"""Share of what the best pair promises beyond which another pair is fitted too; chosen, not calibrated."""
 FITTED_MISFIT = 0.03
 """Share of the explained chi square that a law still leaves wrong once the engine has fitted it."""
 ALIKE = 0.85

@@ -10,50 +10,24 @@ from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, nuisance, verdict
-from surgisim.diagnosis.base import BOLD, Base, fit_base
+from surgisim.diagnosis.base import Base, fit_base
 from surgisim.diagnosis.candidates import Parts, blocks, costly
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.evidence import Finding, by_law, judge
 from surgisim.diagnosis.flexible import Flexible, flexible
-from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
 from surgisim.diagnosis.locate import worst
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
-from surgisim.diagnosis.refine import refined
+from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
 from surgisim.diagnosis.sharpen import finer
-from surgisim.diagnosis.together import together
+from surgisim.diagnosis.together import Together, together
 from surgisim.recordings.recording import Recording
 
 Progress = Callable[[float, float, str], None]
-RUNS = 35
-"""That fitting a law with everything about it free takes, roughly."""
-
-
-@dataclass(frozen=True)
-class Refit:
-    """A law as the engine runs it, fitted."""
-
-    finding: Finding
-    amplitude: np.ndarray
-    response: np.ndarray
-    """What it adds to the base at this amplitude over the whole clip [m], (K, T, 3)."""
-    gain: float
-    log_evidence: float
-    x: np.ndarray | None = None
-    """The base that was fitted with it, (3,); None where the base stayed."""
-    draws: tuple[tuple[Hypothesis, np.ndarray], ...] = ()
-    """The law with other numbers that would do, drawn from its posterior; none where it was not fitted freely."""
-
-    @property
-    def term(self) -> str:
-        return self.finding.hypothesis.term
-
-    @property
-    def searched(self) -> float:
-        """log evidence before the engine ran."""
-        return self.log_evidence - 0.5 * (self.gain - self.finding.gain)
+FIRSTS = 2
+"""Laws beside which a second one is looked for."""
 
 
 @dataclass(frozen=True)
@@ -93,14 +67,11 @@ def diagnose(
     ranked, refits = sorted(laws, key=lambda term: -laws[term][0]), []
     if detected:
         case, refits = compete(case, laws, ranked, progress)
-    accepted = None
+    fitted = None
     if detected:
-        accepted = together(
-            case, refits[:1] + seconds(case, refits[0], bend, progress), lambda text: progress(0.93, 1, text),
-            free=settings.free > 0 and 2 * fit_of_a_law(case) < settings.budget,
-        )  # fmt: skip
+        refits, fitted = explained_by(case, refits, bend, progress)
     progress(0.97, 1, "verdict")
-    return verdict.write(case, laws, ranked, refits, accepted, bend)
+    return verdict.write(case, laws, ranked, refits, fitted, bend)
 
 
 def compete(case: Case, laws: dict, ranked: list[str], progress: Progress) -> tuple[Case, list[Refit]]:
@@ -182,36 +153,6 @@ def threshold(laws: dict, settings: Diagnosing) -> float:
     return max(calibration.THRESHOLD, float(np.quantile(highest, 0.95)))
 
 
-def refit(case: Case, finding: Finding, evidence: float, z: np.ndarray, rounds: int = 3) -> Refit:
-    """The law in the engine, its strength by secants of its response; what the tangent left out is put back.
-
-    Where the engine breaks down, a weaker law is tried once, then the tangent's word is taken.
-    """
-    clip, base, until = case.clip, case.base, case.clip.until
-    amplitude, gain, response = finding.amplitude.copy(), -np.inf, None
-    for _ in range(rounds):
-        try:
-            moved = respond(clip, base, law_of(finding.hypothesis, amplitude, clip), case.memo)
-        except IMPOSSIBLE:
-            amplitude = 0.5 * amplitude
-            continue
-        change = moved - base.simulated
-        white = case.whiten(change[:, :until])[:, None]
-        G, b = float(case.space.gram(white, white)[0, 0]), float(case.space.gram(white, z[:, None])[0, 0])
-        best = b / max(G, 1e-12)
-        # Near its best strength a response may be scaled; far from it, only another run tells.
-        scale = float(np.clip(best, 0.3, 1.4))
-        mine = 2 * scale * b - scale**2 * G
-        if mine > gain:
-            gain, response, kept = mine, scale * change, scale * amplitude
-        if abs(best - 1) < 0.1 or best <= 0:
-            break
-        amplitude = amplitude * float(np.clip(best, 0.4, 2.5))
-    if response is None:
-        return Refit(finding, finding.amplitude, np.zeros_like(base.simulated), 0.0, -np.inf)
-    return Refit(finding, kept, response, gain, evidence + 0.5 * (gain - finding.gain))
-
-
 def from_rest(case: Case, best: Refit, z: np.ndarray) -> bool:
     """Whether paths of grips count from where tissue was at rest: whether the best law fits clearly better that way."""
     law, until = law_of(best.finding.hypothesis, best.amplitude, case.clip), case.clip.until
@@ -226,27 +167,6 @@ def from_rest(case: Case, best: Refit, z: np.ndarray) -> bool:
     return costs[0] - costs[1] > calibration.THRESHOLD
 
 
-def fit_of_a_law(case: Case) -> float:
-    """Particles times steps that a law with everything about it free takes, roughly."""
-    base = case.base
-    steps = base.prepared.per_frame(base.values, case.clip.fps, BOLD) * case.clip.until
-    return RUNS * len(base.prepared.simulator.rest) * steps
-
-
-def freed(case: Case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
-    """The same law with everything about it free; as it was where the engine breaks down.
-
-    Its gain is never less than before: there the base moved along its tangent, which takes more than tissue gives.
-    """
-    found = refined(case, z, [(one.finding.hypothesis, one.amplitude)], one.response, say)
-    if found is None:
-        return one
-    (hypothesis, amplitude), gain = found.laws[0], max(found.gain, one.gain)
-    evidence = one.log_evidence + 0.5 * (gain - one.gain)
-    finding = replace(one.finding, hypothesis=hypothesis)
-    return Refit(finding, amplitude, found.response, gain, evidence, found.x, tuple(found.draws[0]))
-
-
 def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:
     """A law's best finding on two finer lattices, and the law's evidence with what that gains."""
     evidence, _, findings = law
@@ -259,18 +179,45 @@ def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:
     return best, evidence + 0.5 * (best.gain - findings[0].gain)
 
 
-def seconds(case: Case, first: Refit, bend: Flexible, progress: Progress) -> list[Refit]:
-    """What is named beside the first law: one law or none."""
-    if not case.settings.second or verdict.beside(case, bend, [first]) <= calibration.LITTLE_LEFT:
-        return []
-    progress(0.86, 1, f"what {first.term} leaves")
-    found = another(case, first, progress)
-    return [found[0]] if found is not None and verdict.pays(case, bend, first, *found) else []
+def explained_by(case: Case, refits: list[Refit], bend: Flexible, progress: Progress) -> tuple[list, Together]:
+    """What may be named: the best law, or two that fit clearly better together; and the laws, the named one first."""
+    settings = case.settings
+    free = settings.free > 0 and 2 * fit_of_a_law(case) < settings.budget
+
+    def fit(laws: list[Refit]) -> Together:
+        return together(case, laws, lambda text: progress(0.93, 1, text), free=free)
+
+    one = fit(refits[:1])
+    if not settings.second:
+        return refits, one
+    pairs: dict[frozenset, list[Refit]] = {}
+    for n, first in enumerate(r for r in refits[:FIRSTS] if r.gain > calibration.CLOSE * refits[0].gain):
+        progress(0.86 + 0.03 * n, 1, f"what {first.term} leaves")
+        second = another(case, first, bend, progress)
+        if second is not None:
+            terms = frozenset((first.term, second.term))
+            pairs[terms] = max(pairs.get(terms, []), [first, second], key=promise)
+    order = sorted(pairs.values(), key=promise, reverse=True)
+    tried = [fit(pair) for pair in order if promise(pair) > calibration.RUNNER_UP * promise(order[0])]
+    both = max(tried, key=lambda t: t.gain, default=None)
+    if both is None or not verdict.pays(case, bend, one, both):
+        return refits, replace(one, beside=both)
+    first = next(r for r in refits if r.term == both.refits[0].term)
+    # Beside its second, the first is as evident as the two are together.
+    first = replace(first, log_evidence=refits[0].log_evidence + 0.5 * (both.gain - one.gain))
+    return [first, *(r for r in refits if r.term != first.term)], replace(both, beside=one)
 
 
-def another(case: Case, first: Refit, progress: Progress) -> tuple[Refit, float] | None:
-    """The second effect that pays most once the first is there, and its log evidence; None where none does."""
+def promise(pair: list[Refit]) -> float:
+    """What two laws gain one after the other, before they are fitted together."""
+    return sum(r.gain for r in pair)
+
+
+def another(case: Case, first: Refit, bend: Flexible, progress: Progress) -> Refit | None:
+    """The second effect that pays most once the first is there; None where none may do."""
     until = case.clip.until
+    if verdict.still(case, bend, case.base.simulated + first.response) <= calibration.LITTLE_LEFT:
+        return None
     white = case.whiten(first.response[:, :until])
     # The first law's strength is open again: its signature joins the nuisances.
     space = metric(np.concatenate([case.space.columns, white[:, None]], 1))
@@ -281,5 +228,4 @@ def another(case: Case, first: Refit, progress: Progress) -> tuple[Refit, float]
     best = max(laws, key=lambda term: laws[term][0])
     if laws[best][0] < threshold(laws, case.settings):
         return None
-    fine, evidence = sharpened(left, laws[best], z)
-    return refit(left, fine, evidence, z), evidence
+    return refit(left, *sharpened(left, laws[best], z), z)

@@ -41,13 +41,16 @@ def rms(case, simulated) -> tuple[float, float | None]:
     return fitted, 1e3 * float(np.sqrt(np.nanmean(square[:, until:])))
 
 
-def errors(case, after, placebo, sigma: float) -> tuple[dict, dict]:
-    """What diagnosis.json says of fitted frames and of those held out; placebo None where there is none."""
+def errors(case, before, after, placebo, sigma: float) -> tuple[dict, dict]:
+    """What diagnosis.json says of fitted frames and of those held out; placebo None where there is none.
+
+    before, after, placebo: predicted displacement of the points [m], (K, T, 3).
+    """
     clip, until = case.clip, case.clip.until
     floor = 1e3 * np.sqrt(3) * sigma
-    rows = {name: rms(case, s) for name, s in (("before", case.base.simulated), ("after", after))}
+    rows = {name: rms(case, s) for name, s in (("before", before), ("after", after))}
     rows["placebo"] = (None, None) if placebo is None else rms(case, placebo)
-    left = residual(case, case.base.simulated, False)
+    left = residual(case, before, False)
     parts = []
     for span in (slice(0, until), slice(until, clip.frames)):
         seen = clip.seen[:, span]
@@ -61,17 +64,17 @@ def errors(case, after, placebo, sigma: float) -> tuple[dict, dict]:
         result.append(
             {"noise_floor": float(floor), **{n: r[k] for n, r in rows.items()}, "flexible": parts[k], "unit": "mm"}
         )
-    low, high = _bootstrap(case, after)
+    low, high = _bootstrap(case, before, after)
     result[1]["gain_low"], result[1]["gain_high"] = low, high
     return result[0], result[1]
 
 
-def _bootstrap(case, after, draws: int = 200) -> tuple[float | None, float | None]:
+def _bootstrap(case, before, after, draws: int = 200) -> tuple[float | None, float | None]:
     """90 % interval of what the law takes off the held-out mean square [mm^2], points drawn again."""
     clip, until = case.clip, case.clip.until
     if clip.frames == until or not clip.seen[:, until:].any():
         return None, None
-    square = [(residual(case, s, False)[:, until:] ** 2).sum((1, 2)) for s in (case.base.simulated, after)]
+    square = [(residual(case, s, False)[:, until:] ** 2).sum((1, 2)) for s in (before, after)]
     count = clip.seen[:, until:].sum(1)
     rng = np.random.default_rng([case.settings.seed, 2])
     chosen = rng.integers(0, len(count), (draws, len(count)))

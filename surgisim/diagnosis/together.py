@@ -8,9 +8,8 @@ from scipy.linalg import cho_solve
 
 from surgisim.diagnosis.base import SPREAD, bounded, carried, simulate
 from surgisim.diagnosis.errors import rms
-from surgisim.diagnosis.laws import Clash, joined, law_of, respond
+from surgisim.diagnosis.laws import IMPOSSIBLE, Clash, joined, law_of, respond
 from surgisim.diagnosis.refine import refined
-from surgisim.mpm.simulator import Breakdown
 
 
 @dataclass(frozen=True)
@@ -19,6 +18,21 @@ class Together:
     """Best first, with the numbers that they have beside one another; a response stays that of its law alone."""
     moved: np.ndarray
     """Displacement of the points with all of them over the whole clip [m], (K, T, 3)."""
+    gain: float
+    """Of chi square over the base alone."""
+    x: np.ndarray
+    """The base that goes with them, (3,)."""
+    beside: "Together | None" = None
+    """What else was fitted: one law instead of two, or the other way round."""
+
+
+def prediction(case, refits: list, moved: np.ndarray, x: np.ndarray | None) -> Together:
+    """With its gain; x None where the base stays."""
+    until = case.clip.until
+    left = case.z - case.whiten(moved[:, :until] - case.base.simulated[:, :until])
+    both = np.stack([case.z, left], 1)
+    before, after = np.diag(case.space.gram(both, both))
+    return Together(refits, moved, float(before - after), case.base.x if x is None else x)
 
 
 def together(case, refits: list, say: Callable[[str], None], *, free: bool) -> Together:
@@ -28,7 +42,7 @@ def together(case, refits: list, say: Callable[[str], None], *, free: bool) -> T
     responses are taken off, and the engine runs again. What is no better than base and responses as they are, added,
     on the fitted frames is not taken.
     """
-    plain = Together(refits, case.base.simulated + sum(r.response for r in refits))
+    plain = prediction(case, refits, case.base.simulated + sum(r.response for r in refits), refits[0].x)
     if len(refits) == 1 and refits[0].x is not None:
         # Law and base were fitted in the same runs.
         return plain
@@ -51,7 +65,7 @@ def _freed(case, refits: list, say) -> list[Together]:
         replace(r, finding=replace(r.finding, hypothesis=h), amplitude=amplitude, x=found.x, draws=tuple(draws))
         for r, (h, amplitude), draws in zip(refits, found.laws, found.draws, strict=True)
     ]
-    return [Together(mine, case.base.simulated + found.response)]
+    return [prediction(case, mine, case.base.simulated + found.response, found.x)]
 
 
 def _moved(case, refits: list) -> list[Together]:
@@ -64,6 +78,7 @@ def _moved(case, refits: list) -> list[Together]:
         simulated = carried(base.prepared.simulator.carry(clip.rest), run)
         moved = replace(base, x=x, drive=drive, run=run, simulated=simulated)
         laws = [law_of(r.finding.hypothesis, r.amplitude, clip) for r in refits]
-        return [Together(refits, simulated + sum(respond(clip, moved, law, case.memo) - simulated for law in laws))]
-    except Breakdown:
+        both = simulated + sum(respond(clip, moved, law, case.memo) - simulated for law in laws)
+    except IMPOSSIBLE:
         return []
+    return [prediction(case, refits, both, x)]

@@ -1,6 +1,6 @@
 """From fits to a verdict: probabilities, intervals, held-out errors, and what is said in words."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import expit
@@ -14,11 +14,13 @@ from surgisim.diagnosis.errors import errors, residual, rms
 from surgisim.diagnosis.experiment import separating
 from surgisim.diagnosis.flexible import flexible
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import IMPOSSIBLE, described, law_of, respond
+from surgisim.diagnosis.laws import described, law_of
 from surgisim.diagnosis.locate import cause, of_places, symptom
 from surgisim.diagnosis.model import base_numbers, physics
 from surgisim.diagnosis.noise import Noise, estimate
-from surgisim.diagnosis.together import Together
+from surgisim.diagnosis.refit import refit
+from surgisim.diagnosis.replay import Replay, replayed
+from surgisim.diagnosis.together import Together, together
 
 RUNNERS, PLACEBOS = 4, 3
 """Other laws that an effect lists, and placebos that are tried where the engine breaks down with one."""
@@ -57,6 +59,7 @@ def judged(case, laws, refits, fitted: Together, bend) -> Judgement:
         "gained": float(explained),
         "taken": taken(case, after, noise.sigma),
         "left": still(case, bend, after),
+        "gain": fitted.gain,
         "predicted": predicted(case, after, noise.sigma),
     }
     explained = max(shares["gained"], shares["taken"])
@@ -71,9 +74,11 @@ def judged(case, laws, refits, fitted: Together, bend) -> Judgement:
     most = 1.0 if verdict != "unexplained" else float(np.clip(explained / 2, 0.0, 0.45))
     scale = min(1.0, most / max(chances[first.term], 1e-12))
     chances = {term: scale * chance for term, chance in chances.items()}
-    effects = [_effect(case, r, chances, laws, refits, n) for n, r in enumerate(accepted)]
+    effects = [_effect(case, r, chances, {a.term for a in accepted}, n) for n, r in enumerate(accepted)]
     for effect in effects:
         effect["probability"] = min(effect["probability"], most)
+    # A law that is named beside another is as probable as that, not as it would be in the other's stead.
+    chances |= {effect["term"]: effect["probability"] for effect in effects[1:]}
     if verdict == "unexplained":
         # What is not believed is not modelled.
         after = case.base.simulated
@@ -92,8 +97,11 @@ def write(case, laws, ranked, refits, fitted: Together | None, bend) -> tuple[Di
         said_of = Judgement("nothing detectable", [], nothing, [], 0.0, plain, noise_beside(case, plain), {})
     verdict, effects, chances, named = said_of.verdict, said_of.effects, said_of.chances, said_of.named
     after, noise, explained = said_of.after, said_of.noise, said_of.explained
-    placebo = _placebo(case, refits, laws, rng) if named else None
-    fit, held_out = errors(case, after, placebo, noise.sigma)
+    placebo = _placebo(case, refits, {r.term for r in said_of.accepted}, laws) if named else None
+    # What is shown is replayed on a finer grid, where the engine bears it.
+    fine = replayed(case, fitted, placebo) if named else None
+    shown = fine or Replay(clip, base.simulated, after, None if placebo is None else placebo.moved)
+    fit, held_out = errors(case, shown.before, shown.after, shown.placebo, noise.sigma)
     z, reach = symptom(clip, noise, residual(case, base.simulated, False, rest_only=False), rng)
     freed = case.z - case.space.explained(case.z)
     cleared = case.nulls - case.space.explained(case.nulls)
@@ -127,12 +135,14 @@ def write(case, laws, ranked, refits, fitted: Together | None, bend) -> tuple[Di
             "nulls": np.round(np.max([n for _, n, _ in laws.values()], 0), 3).tolist(),
             "explainable": float(explainable(bend)),
             **said_of.shares,
+            "spacing": {"value": float(1e3 * shown.clip.body.spacing), "unit": "mm"},
+            "beside": None if fitted is None or fitted.beside is None else _beside(case, bend, fitted.beside),
         },
     )
     mismatch = Mismatch(
         points=clip.rest,
-        residual_before=residual(case, base.simulated),
-        residual_after=residual(case, after),
+        residual_before=residual(case, shown.before),
+        residual_after=residual(case, shown.after),
         z=z,
         significant=reach,
         particles=base.prepared.simulator.rest,
@@ -140,7 +150,7 @@ def write(case, laws, ranked, refits, fitted: Together | None, bend) -> tuple[Di
         cause_time=np.concatenate([when, np.zeros(clip.frames - clip.until)]),
         phase=clip.phases(),
     )
-    return diagnosis, physics(case, said_of.accepted if named else []), mismatch
+    return diagnosis, physics(replace(case, clip=shown.clip), said_of.accepted if named else []), mismatch
 
 
 def noise_beside(case, after: np.ndarray) -> Noise:
@@ -182,17 +192,12 @@ def doubtful(term: str, shares: dict[str, float | None]) -> bool:
     return shares["predicted"] is not None and shares["predicted"] < calibration.PREDICTED
 
 
-def pays(case, bend, first, second, log_evidence: float) -> bool:
-    """Whether a second law says enough to be named beside the first; log_evidence: of it, before the engine ran."""
-    rest = beside(case, bend, [first]) * explainable(bend)
+def pays(case, bend, one: Together, both: Together) -> bool:
+    """Whether a second law fitted together with the first says enough to be named beside it."""
+    rest, left = (still(case, bend, t.moved) for t in (one, both))
     # What the first law's signature has wrong must not pass for a second law.
-    least = calibration.THRESHOLD + calibration.FITTED_MISFIT * first.gain
-    return second.gain > calibration.SECOND * rest and log_evidence > least
-
-
-def beside(case, bend, refits) -> float:
-    """As `still`, beside these laws as they were fitted."""
-    return still(case, bend, case.base.simulated + sum(r.response for r in refits))
+    least = calibration.THRESHOLD + calibration.FITTED_MISFIT * one.gain
+    return left < (1 - calibration.SECOND) * rest and 0.5 * (both.gain - one.gain) > least
 
 
 def still(case, bend, after: np.ndarray) -> float:
@@ -242,13 +247,12 @@ def missing(clip) -> list[str]:
     return [name for name in PHASES if name not in present]
 
 
-def _effect(case, r, chances, laws, refits, number) -> dict:
+def _effect(case, r, chances, named: set[str], number) -> dict:
     h: Hypothesis = r.finding.hypothesis
     # Of a blob the radius at which it is down to a half; a grip's own radius.
     reach = 1.0 if r.term == "tool_slip" else np.sqrt(2 * np.log(2))
-    runners = [
-        {"term": t, "probability": chances[t]} for t in sorted(chances, key=lambda t: -chances[t]) if t != r.term
-    ]
+    others = sorted((t for t in chances if t not in named), key=lambda t: -chances[t])
+    runners = [{"term": t, "probability": chances[t]} for t in others]
     local = h.place is not None and h.place.normal is None
     place: dict | str = "everywhere"
     if local:
@@ -265,6 +269,15 @@ def _effect(case, r, chances, laws, refits, number) -> dict:
         "separating_experiment": "",
         "log_evidence": float(r.log_evidence),
         "size": {"value": float(1e3 * r.finding.size), "unit": "mm"},
+    }
+
+
+def _beside(case, bend, other: Together) -> dict:
+    return {
+        "laws": [r.term for r in other.refits],
+        "gain": other.gain,
+        "left": still(case, bend, other.moved),
+        "held_out_rms": rms(case, other.moved)[1],
     }
 
 
@@ -304,8 +317,11 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
     return result
 
 
-def _placebo(case, refits, laws, rng) -> np.ndarray | None:
-    """The same law at a wrong place, or a wrong law, with its strength fitted all the same; None where none acts."""
+def _placebo(case, refits, named: set[str], laws) -> Together | None:
+    """The same law at a wrong place, or a wrong law: the one that fits best, fitted in the engine, its base moved too.
+
+    None where none acts.
+    """
     first = refits[0].finding.hypothesis
     mine = laws[refits[0].term][2]
     far = (
@@ -321,16 +337,14 @@ def _placebo(case, refits, laws, rng) -> np.ndarray | None:
     others = far or [
         laws[t][2][0]
         for t in sorted(laws)
-        if t not in {r.term for r in refits[:2]} and laws[t][2][0].hypothesis.mix.shape[1] <= 3
+        if t not in named | {r.term for r in refits[:2]} and laws[t][2][0].hypothesis.mix.shape[1] <= 3
     ]
     # One whose strength came out as nothing is no placebo.
-    acting = [f for f in others if f.size > 0]
-    for k in rng.permutation(len(acting))[:PLACEBOS]:
-        law = law_of(acting[k].hypothesis, acting[k].amplitude, case.clip)
-        try:
-            return respond(case.clip, case.base, law, case.memo)
-        except IMPOSSIBLE:
-            continue
+    acting = sorted((f for f in others if f.size > 0), key=lambda f: -f.log_evidence)
+    for finding in acting[:PLACEBOS]:
+        fitted = refit(case, finding, finding.log_evidence, case.z)
+        if fitted.response.any():
+            return together(case, [fitted], lambda text: None, free=False)
     return None
 
 

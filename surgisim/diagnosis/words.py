@@ -23,6 +23,9 @@ SAYS = {
     "sliding_base": ("the tissue glides along its base where it is pulled hard", "a base with friction ({amount})"),
 }  # fmt: skip
 
+READ_IN = {"1": (1.0, ""), "kg": (1e3, " g")}
+"""Units that nobody reads a tissue's numbers in, and what is written instead."""
+
 
 def sentence(found: Sequence[tuple[Hypothesis, dict[str, dict], float]], gained: float) -> str:
     """What is seen, and what naming it gains; found: laws, their parameters, and their sizes [m]."""
@@ -43,8 +46,9 @@ def _told(h: Hypothesis, parameters: dict[str, dict]) -> tuple[str, str]:
     amount = ""
     if parameters:
         name, first = next(iter(parameters.items()))
-        unit = "" if first["unit"] == "1" else f" {first['unit']}"
-        amount = f"{name} = {first['value']:.3g}{unit}, {first['low']:.3g} to {first['high']:.3g}"
+        times, unit = READ_IN.get(first["unit"], (1.0, f" {first['unit']}"))
+        value, low, high = (times * first[key] for key in ("value", "low", "high"))
+        amount = f"{name} = {value:.3g}{unit}, {low:.3g} to {high:.3g}"
     softer = "s" in parameters and parameters["s"]["value"] < 1
     said = seen.format(
         where=where, onset=_moment(h.onset), end=_moment(h.end), less="more" if softer else "less",

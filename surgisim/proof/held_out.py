@@ -9,6 +9,7 @@ tissue's. In mm.
     noise_floor   the tracking noise; one number with `oracle`, in which nothing but noise is left
     share         (before - after) / (before - oracle): what the diagnosis cuts of what the oracle would
     share_effect  (before - after) / (oracle_before - oracle): the same over what the effect itself adds
+    placebo_better   whether the placebo's error is smaller, by however little
     shows         whether the effect is there at all: at least as large as the tracking noise in these frames
 
 The oracle is another solver than the one that diagnoses, so that `share` also counts the engine's own error.

@@ -5,14 +5,16 @@ import pytest
 from planted import GRID, recording
 
 from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis import verdict
 from surgisim.diagnosis.clip import clip_of
-from surgisim.diagnosis.diagnose import Refit, prepare_case
+from surgisim.diagnosis.diagnose import prepare_case
 from surgisim.diagnosis.errors import rms
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import law_of, respond
 from surgisim.diagnosis.memo import Memo
-from surgisim.diagnosis.together import together
+from surgisim.diagnosis.refit import Refit
+from surgisim.diagnosis.together import Together, together
 
 WEIGHT, AXIS, TURN = np.array([6.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), 0.25
 
@@ -47,3 +49,13 @@ def test_laws_that_are_fitted_together_do_not_make_up_for_each_other(case):
     assert abs(both.refits[1].finding.hypothesis.about["axis"] @ AXIS) > np.cos(0.5 * TURN)
     assert len(both.refits[0].draws) == len(both.refits[1].draws) > 0
     assert any("gravity and fibre" in text for text in said)
+
+
+@pytest.mark.parametrize(
+    ("gain", "left", "said"), [(400.0, 0.1, True), (400.0, 0.3, False), (260.0, 0.1, False), (200.0, 0.4, False)]
+)
+def test_a_second_law_is_named_for_what_both_explain_together(monkeypatch, gain, left, said):
+    one, both = (Together([], np.array(x), g, np.zeros(3)) for x, g in ((0.4, 200.0), (left, gain)))
+    monkeypatch.setattr(verdict, "still", lambda case, bend, moved: float(moved))
+    # Half of what is left has to go, and half the gain must exceed 25 + 3 % of 200.
+    assert verdict.pays(None, None, one, both) is said

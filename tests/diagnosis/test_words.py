@@ -30,3 +30,8 @@ def test_two_laws_are_both_said():
 def test_a_number_without_a_unit_is_said_without_one():
     softer = Hypothesis("damage", np.eye(1), 1, None)
     assert "(most = 0.5, 0.4 to 0.6)" in sentence([(softer, of("most", 0.5, "1"), 1e-3)], 1.0)
+
+
+def test_a_load_is_said_in_grams():
+    load = Hypothesis("added_mass", np.eye(1), 1, Place((0.0, 0.0, 0.0), 0.003), 0.6)
+    assert "a weight there (mass = 8.6 g, 6.88 to 10.3)" in sentence([(load, of("mass", 8.6e-3, "kg"), 6e-4)], 1.0)

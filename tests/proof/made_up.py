@@ -140,7 +140,7 @@ def diagnosis(name: str = "r-made", verdict: str = "named", effects: tuple | Non
         "unexplained_fraction": 0.12,
         "words": "The tissue gives way less over one place. A stiff lump there removes 84 % of the held-out error.",
         "ranking": [
-            {"term": t, "place": PLACE, "log_evidence": e, "probability": p, "cos": c, "held_out": 0.5}
+            {"term": t, "place": PLACE, "log_evidence": e, "probability": p, "cos": c, "held_out_rms": 0.5}
             for t, e, p, c in RANKED
         ],
     }  # fmt: skip

@@ -63,3 +63,22 @@ def test_where_no_law_helps_none_is_named(engine, monkeypatch):
     takes = (swinging(0.5, 0.0, 0.01, seed) for seed in (1, 2))
     told = name(useless, BASE, *takes, 0.01, 3.0, lambda *_: None)
     assert (told.verdict.verdict, told.verdict.names) == ("nothing detectable", ())
+
+
+def fading(seed: int):
+    """A take whose swings decay twice as fast in its first second as afterwards."""
+    take = swinging(0.0, 0.0, 0.01, seed)
+    t = np.arange(take.frames) / FPS
+    lost = np.where(t < 1, 1.2 * t, 1.2 + 0.6 * (t - 1))
+    y = 0.01 * np.exp(-lost) * np.cos(2 * np.pi * t) - 0.01
+    points = take.attached()[:, None] + y[None, :, None] * np.array([0.0, 0.0, 1.0])
+    return dataclasses.replace(take, points=points.astype(np.float32))
+
+
+def test_all_swings_may_count_alike(engine):
+    first, second = fading(1), fading(2)
+    largest = name(LAWS[:1], BASE, first, second, 0.01, 3.0, lambda *_: None)
+    every = name(LAWS[:1], BASE, first, second, 0.01, 3.0, lambda *_: None, swings=1.0)
+    decays = [1e-3 * told.physics["terms"]["newtonian"]["eta"]["value"] for told in (largest, every)]
+    # Over the three seconds it loses .8 per second on average, 1.2 in the first.
+    assert abs(decays[1] - 0.8) < 0.6 * abs(decays[0] - 0.8), decays

@@ -24,6 +24,8 @@ from surgisim.recordings.recording import Recording
 
 CLOSE = 1.10
 EVALUATIONS = 5
+FLOOR = 1e-4
+"""Swing below which markers are as good as still [m]."""
 DIFFERENCE = 0.03
 """Relative step of the differences that a fit goes by."""
 
@@ -81,8 +83,22 @@ def rms(left: np.ndarray) -> float:
     return float(np.sqrt((left**2).sum(-1).mean()))
 
 
-def try_law(law: Law, base: Values, take: Recording, other: Recording, spacing: float, frames: int) -> Tried:
-    """Scan, fit, predict the other take."""
+def alike(take: Recording, frames: int, frequency: float) -> np.ndarray:
+    """Weights under which a body's late swings count as much as its first ones, (frames,): one over how far its points
+    go within the period around a frame, no less than FLOOR, largest 1."""
+    path = take.points[:, :frames].astype(float)
+    span = min(round(take.fps / frequency), frames)
+    first = np.clip(np.arange(frames) - span // 2, 0, frames - span)
+    parts = np.stack([path[:, t : t + span] for t in first])
+    swing = np.sqrt(((parts - parts.mean(2, keepdims=True)) ** 2).sum(-1).mean((1, 2)))
+    weight = 1 / np.maximum(swing, FLOOR)
+    return weight / weight.max()
+
+
+def try_law(
+    law: Law, base: Values, take: Recording, other: Recording, spacing: float, frames: int, weight: np.ndarray
+) -> Tried:
+    """Scan, fit with frames weighted, (frames,), predict the other take."""
 
     def left(x: np.ndarray, on: Recording) -> np.ndarray:
         values, places = law.make(x)
@@ -92,37 +108,42 @@ def try_law(law: Law, base: Values, take: Recording, other: Recording, spacing: 
     errors = []
     for x in starts:
         try:
-            errors.append(rms(left(x, take)))
+            errors.append(rms(weight[:, None] * left(x, take)))
         except Breakdown:
             errors.append(np.inf)
     x = starts[int(np.argmin(errors))]
     bounds = (np.array(law.low), np.array(law.high)) if law.low else (-np.inf, np.inf)
     found = least_squares(
-        lambda x: 1e3 * left(x, take).ravel(), x, bounds=bounds, x_scale=np.maximum(np.abs(x), 1e-6),
-        diff_step=DIFFERENCE, max_nfev=EVALUATIONS, xtol=1e-3, ftol=1e-3,
+        lambda x: 1e3 * (weight[:, None] * left(x, take)).ravel(), x, bounds=bounds,
+        x_scale=np.maximum(np.abs(x), 1e-6), diff_step=DIFFERENCE, max_nfev=EVALUATIONS, xtol=1e-3, ftol=1e-3,
     )  # fmt: skip
-    return Tried(law, found.x, 1e-3 * float(np.sqrt(3 * np.mean(found.fun**2))), rms(left(found.x, other)))
+    return Tried(law, found.x, rms(left(found.x, take)), rms(left(found.x, other)))
 
 
 def name(
-    laws: list[Law], base: Values, take: Recording, other: Recording, spacing: float, seconds: float, progress
-) -> Found:
-    """The law under which the other take is predicted best, and how much better than by the base."""
+    laws: list[Law], base: Values, take: Recording, other: Recording, spacing: float, seconds: float, progress,
+    swings: float | None = None,
+) -> Found:  # fmt: skip
+    """The law under which the other take is predicted best, and how much better than by the base.
+
+    swings: frequency [Hz] of a body all of whose swings shall count alike in a fit; otherwise the largest count most.
+    """
     frames = round(seconds * take.fps) + 1
+    weight = np.ones(frames) if swings is None else alike(take, frames, swings)
     plain = [rms(misfit(r, simulate(r, base, {}, spacing, frames))) for r in (take, other)]
     tried = []
     for i, law in enumerate(laws):
         progress(i, len(laws), law.name)
-        tried.append(try_law(law, base, take, other, spacing, frames))
+        tried.append(try_law(law, base, take, other, spacing, frames, weight))
     tried.sort(key=lambda t: t.other)
     best = tried[0]
-    alike = [t for t in tried[1:] if t.other < CLOSE * best.other and t.fitted < plain[0]]
+    like = [t for t in tried[1:] if t.other < CLOSE * best.other and t.fitted < plain[0]]
     pays = best.other < plain[1] and best.fitted < plain[0]
-    verdict = "nothing detectable" if not pays else "equivalence class" if alike else "named"
+    verdict = "nothing detectable" if not pays else "equivalence class" if like else "named"
     # Two independent numbers a swing; not calibrated, only a way to say how far the others are behind.
     weight = {t.law.name: (best.other / t.other) ** frames**0.5 for t in tried}
     share = {n: w / sum(weight.values()) for n, w in weight.items()}
-    effects = tuple(_effect(t, share) for t in [best, *alike]) if pays else ()
+    effects = tuple(_effect(t, share) for t in [best, *like]) if pays else ()
     ranking = tuple(Candidate(t.law.name, None, None, share[t.law.name], None, 1e3 * t.other) for t in tried)
     fit = {"before": 1e3 * plain[0], "after": 1e3 * best.fitted, "placebo": 1e3 * tried[-1].fitted}
     held = {"before": 1e3 * plain[1], "after": 1e3 * best.other, "placebo": 1e3 * tried[-1].other}
@@ -131,7 +152,7 @@ def name(
         f"Without {said} the simulation is {1e3 * plain[1]:.2g} mm off a take that was never fitted, with it "
         f"{1e3 * best.other:.2g} mm."
     )
-    behind = [t for t in tried[1:] if t not in alike]
+    behind = [t for t in tried[1:] if t not in like]
     if behind:
         words += f" The next law, {behind[0].law.name.replace('_', ' ')}, leaves {1e3 * behind[0].other:.2g} mm."
     told = Verdict(take.name, verdict, effects, ranking, None, (), fit, held, None, words)

@@ -1,0 +1,57 @@
+"""Base, what is named and a placebo once more, on a finer grid.
+
+The search runs on a coarse grid, where a thousand runs cost minutes. Its own error there is as large as an effect that
+shows little in a second grasp, and may happen to hide it or to pass for it; what is shown is replayed with that error
+smaller, with the same numbers.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from surgisim.diagnosis.base import carried, simulate
+from surgisim.diagnosis.clip import Clip, clip_of
+from surgisim.diagnosis.laws import IMPOSSIBLE, Clash, joined, law_of, respond
+from surgisim.diagnosis.together import Together
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Displacement of the points over the whole clip [m], (K, T, 3)."""
+
+    clip: Clip
+    """With the grid of these runs."""
+    before: np.ndarray
+    after: np.ndarray
+    placebo: np.ndarray | None
+
+
+def replayed(case, named: Together, placebo: Together | None) -> Replay | None:
+    """The three predictions of a `diagnose.Case`.
+
+    None where the grid would not be finer, or where the engine breaks down on it.
+    """
+    share = case.settings.replay
+    if share >= case.settings.grid:
+        return None
+    clip = replace(case.clip, body=clip_of(case.clip.recording, share=share, device=case.clip.device).body)
+    memo = replace(case.memo, about=f"{case.memo.about} {share}")
+
+    def bare(x: np.ndarray) -> np.ndarray:
+        _, run = simulate(prepared, clip, x, memo, clip.frames)
+        return carried(prepared.simulator.carry(clip.rest), run)
+
+    def moved(what: Together) -> np.ndarray:
+        base = replace(case.base, x=what.x)
+        laws = [law_of(r.finding.hypothesis, r.amplitude, clip) for r in what.refits]
+        try:
+            return respond(clip, base, joined(laws), memo)
+        except Clash:
+            simulated = bare(what.x)
+            return simulated + sum(respond(clip, base, law, memo) - simulated for law in laws)
+
+    try:
+        prepared = clip.prepared(case.base.prepared.terms)
+        return Replay(clip, bare(case.base.x), moved(named), None if placebo is None else moved(placebo))
+    except IMPOSSIBLE:
+        return None
