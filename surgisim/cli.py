@@ -26,6 +26,7 @@ Cores = Annotated[str, typer.Option(help="How many cores to use: a number or 'al
 Profile = Annotated[str | None, typer.Option(help="Where to run: gpu, slurm, or a folder with a Snakemake profile.")]
 Until = Annotated[str | None, typer.Option(help="Stop after this stage.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Only say what would run.")]
+Diagnose = Annotated[bool, typer.Option("--diagnose", help="Also say what physics the simulation lacks.")]
 Debug = Annotated[bool, typer.Option(help="Show everything Snakemake says, and tracebacks.")]
 
 GRASP = "What the tool holds: middle and radius in the recording's first frame [px], from when to when [s]."
@@ -48,6 +49,7 @@ def run(
     cores: Cores = "all",
     profile: Profile = None,
     until: Until = None,
+    diagnose: Diagnose = False,
     dry_run: DryRun = False,
     debug: Debug = False,
 ) -> None:
@@ -70,6 +72,7 @@ def run(
             cores=cores,
             profile=profile,
             until=until,
+            diagnose=diagnose,
             dry=dry_run,
             debug=debug,
         )

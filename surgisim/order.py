@@ -13,6 +13,7 @@ from rich.markup import escape
 
 from surgisim.artifacts.base import load
 from surgisim.artifacts.fit import Fit
+from surgisim.artifacts.verdict import read_verdict
 from surgisim.clips import EMBEDDED, merge_entry, value
 from surgisim.config.base import parse
 from surgisim.config.whole import PARENTS, Whole, rooted
@@ -39,6 +40,8 @@ class Order:
     cores: str
     profile: str | None
     until: str | None
+    diagnose: bool
+    """Whether to say what the simulation lacks, too."""
     dry: bool
     debug: bool
 
@@ -139,7 +142,8 @@ def _arguments(order: Order, written: Path) -> list[str]:
             near = difflib.get_close_matches(order.until, stages, 1, 0.0)[0]
             raise Problem(f"--until {order.until}: there is no such stage; did you mean '{near}'? Known: {stages}.")
         arguments += ["--until", order.until]
-    return arguments + (["--dry-run"] if order.dry else [])
+    arguments += ["--dry-run"] if order.dry else []
+    return [*arguments, "--", "all", "clip_diagnoses"] if order.diagnose else arguments
 
 
 def _profiles() -> str:
@@ -175,6 +179,11 @@ def _answer(console: Console, todo: Plan, out: Path, code: int, state: State, or
             fit = out / "results" / clip / variant / "estimation" / "fit.json"
             if fit.is_file():
                 console.print(f"         {escape(load(Fit, fit).words)}", soft_wrap=True)
+            diagnosis = out / "results" / clip / variant / "diagnosis"
+            if (diagnosis / "diagnosis.html").is_file():
+                console.print(f"lacks    {escape(str(diagnosis / 'diagnosis.html'))}")
+                words = read_verdict(diagnosis / "diagnosis.json").words
+                console.print(f"         {escape(words)}", soft_wrap=True)
     if (out / "results" / "summary.html").is_file():
         console.print(f"summary  {escape(str(out / 'results' / 'summary.html'))}")
     return 0

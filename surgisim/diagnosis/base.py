@@ -25,7 +25,7 @@ TERMS = ("neo_hookean_ciarlet", "newtonian")
 START = np.array([np.log(3e3), 0.45, np.log(3e-3)])
 """log E [Pa], nu, log eta / E [s]."""
 SPREAD = np.array([0.8, 0.03, 0.8])
-LOW, HIGH = np.array([np.log(5e2), 0.30, np.log(3e-4)]), np.array([np.log(5e4), 0.485, np.log(3e-2)])
+LOW, HIGH = np.array([np.log(5e2), 0.30, np.log(3e-4)]), np.array([np.log(5e5), 0.485, np.log(3e-2)])
 STEP = np.array([0.2, 0.01, 0.3])
 SLOWER = 8
 """Times that viscosity may shorten the stable step of tissue of the usual stiffness (`mpm/stable.py`). To a base
@@ -169,7 +169,7 @@ class _Around:
         """The best body, or a softer one that fits as well."""
         starts = self.starts()
         best = self.descend(starts[0], say)
-        below = [y for y in starts if y[0] < best[0] - SOFTER]
+        below = [y for y in starts[1:] if y[0] < best[0] - SOFTER]
         if not below:
             return best
         softer = self.descend(below[0], say)

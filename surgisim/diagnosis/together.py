@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cho_solve
 
-from surgisim.diagnosis.base import SPREAD, bounded, carried, simulate
+from surgisim.diagnosis.base import SPREAD, Base, bounded, carried, simulate
 from surgisim.diagnosis.errors import rms
 from surgisim.diagnosis.laws import IMPOSSIBLE, Clash, joined, law_of, respond
 from surgisim.diagnosis.refine import refined
@@ -24,6 +24,14 @@ class Together:
     """The base that goes with them, (3,)."""
     beside: "Together | None" = None
     """What else was fitted: one law instead of two, or the other way round."""
+
+
+def based(case, x: np.ndarray) -> Base:
+    """The base with other numbers, (3,), run anew. Raises what IMPOSSIBLE names."""
+    clip, base = case.clip, case.base
+    drive, run = simulate(base.prepared, clip, x, case.memo, clip.frames)
+    simulated = carried(base.prepared.simulator.carry(clip.rest), run)
+    return replace(base, x=x, drive=drive, run=run, simulated=simulated)
 
 
 def prediction(case, refits: list, moved: np.ndarray, x: np.ndarray | None) -> Together:
@@ -74,9 +82,8 @@ def _moved(case, refits: list) -> list[Together]:
     likely = cho_solve(case.space.factor, case.space.seen_through(left))[case.slopes]
     x = bounded((base.x if first is None else first) + likely * SPREAD, clip)
     try:
-        drive, run = simulate(base.prepared, clip, x, case.memo, clip.frames)
-        simulated = carried(base.prepared.simulator.carry(clip.rest), run)
-        moved = replace(base, x=x, drive=drive, run=run, simulated=simulated)
+        moved = based(case, x)
+        simulated = moved.simulated
         laws = [law_of(r.finding.hypothesis, r.amplitude, clip) for r in refits]
         both = simulated + sum(respond(clip, moved, law, case.memo) - simulated for law in laws)
     except IMPOSSIBLE:

@@ -18,12 +18,12 @@ from surgisim.diagnosis.laws import described, law_of
 from surgisim.diagnosis.locate import cause, of_places, symptom
 from surgisim.diagnosis.model import base_numbers, physics
 from surgisim.diagnosis.noise import Noise, estimate
-from surgisim.diagnosis.refit import refit
+from surgisim.diagnosis.placebo import placebo
 from surgisim.diagnosis.replay import Replay, replayed
-from surgisim.diagnosis.together import Together, together
+from surgisim.diagnosis.together import Together
 
-RUNNERS, PLACEBOS = 4, 3
-"""Other laws that an effect lists, and placebos that are tried where the engine breaks down with one."""
+RUNNERS = 4
+"""Other laws that an effect lists."""
 
 
 @dataclass(frozen=True)
@@ -97,10 +97,10 @@ def write(case, laws, ranked, refits, fitted: Together | None, bend) -> tuple[Di
         said_of = Judgement("nothing detectable", [], nothing, [], 0.0, plain, noise_beside(case, plain), {})
     verdict, effects, chances, named = said_of.verdict, said_of.effects, said_of.chances, said_of.named
     after, noise, explained = said_of.after, said_of.noise, said_of.explained
-    placebo = _placebo(case, refits, {r.term for r in said_of.accepted}, laws) if named else None
+    wrong = placebo(case, fitted, refits, laws) if named else None
     # What is shown is replayed on a finer grid, where the engine bears it.
-    fine = replayed(case, fitted, placebo) if named else None
-    shown = fine or Replay(clip, base.simulated, after, None if placebo is None else placebo.moved)
+    fine = replayed(case, fitted, wrong) if named else None
+    shown = fine or Replay(clip, base.simulated, after, None if wrong is None else wrong.moved)
     fit, held_out = errors(case, shown.before, shown.after, shown.placebo, noise.sigma)
     z, reach = symptom(clip, noise, residual(case, base.simulated, False, rest_only=False), rng)
     freed = case.z - case.space.explained(case.z)
@@ -315,37 +315,6 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
             }
         )
     return result
-
-
-def _placebo(case, refits, named: set[str], laws) -> Together | None:
-    """The same law at a wrong place, or a wrong law: the one that fits best, fitted in the engine, its base moved too.
-
-    None where none acts.
-    """
-    first = refits[0].finding.hypothesis
-    mine = laws[refits[0].term][2]
-    far = (
-        [
-            f
-            for f in mine
-            if f.hypothesis.place is not None
-            and np.linalg.norm(np.subtract(f.hypothesis.place.center, first.place.center)) > 0.012
-        ]
-        if first.place is not None
-        else []
-    )
-    others = far or [
-        laws[t][2][0]
-        for t in sorted(laws)
-        if t not in named | {r.term for r in refits[:2]} and laws[t][2][0].hypothesis.mix.shape[1] <= 3
-    ]
-    # One whose strength came out as nothing is no placebo.
-    acting = sorted((f for f in others if f.size > 0), key=lambda f: -f.log_evidence)
-    for finding in acting[:PLACEBOS]:
-        fitted = refit(case, finding, finding.log_evidence, case.z)
-        if fitted.response.any():
-            return together(case, [fitted], lambda text: None, free=False)
-    return None
 
 
 def _words(case, verdict, refits, accepted, effects, explained, laws, z) -> str:

@@ -19,6 +19,8 @@ FINE = 0.5
 """Width of a voxel of the body's surface over the body's spacing."""
 FITTED = 0.7
 """Share of the frames that are fitted where none were held out after them."""
+HALF = 0.5
+"""Tissue over a voxel on the surface."""
 MARGIN = 4
 """Empty voxels around the body."""
 
@@ -62,28 +64,34 @@ def recording_of(
 
 def surface(body: Body) -> Mesh:
     """The closed surface on which half of a voxel's worth of tissue lies within a voxel's reach."""
-    width = FINE * body.spacing
-    low = body.rest.min(0).astype(float) - (MARGIN + 0.5) * width
-    at = (body.rest.astype(float) - low) / width
-    shape = np.ceil(at.max(0)).astype(int) + MARGIN
-    edges = [np.arange(n + 1) for n in shape]
-    volume, _ = np.histogramdd(at, edges, weights=body.volume.astype(float))
-    share = gaussian_filter(volume / width**3, 1.0)
-    vertices, faces, _, _ = marching_cubes(share, 0.5)
+    share, low, width = _share(body)
+    vertices, faces, _, _ = marching_cubes(share, HALF)
     # A voxel's number belongs to its middle.
     return closed(Mesh(low + (vertices + 0.5) * width, faces.astype(int)), "the clip's body")
 
 
 def held_boxes(body: Body, held: np.ndarray) -> np.ndarray:
-    """Voxels in which most particles are held, joined along z [m], (B, 2, 3)."""
-    width = FINE * body.spacing
-    low = body.rest.min(0).astype(float) - 0.5 * width
-    cell = np.floor((body.rest - low) / width).astype(int)
-    shape = tuple(cell.max(0) + 1)
-    flat = np.ravel_multi_index(cell.T, shape)
-    count = np.bincount(flat, minlength=np.prod(shape))
-    mostly = (np.bincount(flat, held, np.prod(shape)) > 0.5 * np.maximum(count, 1)).reshape(shape)
+    """Voxels inside the surface in which most particles are held, joined along z [m], (B, 2, 3)."""
+    share, low, width = _share(body)
+    flat = np.ravel_multi_index(_cells(body, low, width).T, share.shape)
+    count = np.bincount(flat, minlength=share.size)
+    mostly = (np.bincount(flat, held, share.size) > 0.5 * np.maximum(count, 1)).reshape(share.shape) & (share > HALF)
     steps = np.diff(np.pad(mostly.astype(int), ((0, 0), (0, 0), (1, 1))), axis=2)
     begin, end = np.argwhere(steps == 1), np.argwhere(steps == -1)
     corner = np.stack([begin, np.concatenate([end[:, :2] + 1, end[:, 2:]], 1)], 1)
     return low + corner * width
+
+
+def _share(body: Body) -> tuple[np.ndarray, np.ndarray, float]:
+    """Tissue within reach of every voxel over the voxel, (X, Y, Z) [1], the voxels' corner, (3,) [m], and width [m]."""
+    width = FINE * body.spacing
+    low = body.rest.min(0).astype(float) - (MARGIN + 0.5) * width
+    cells = _cells(body, low, width)
+    shape = tuple(cells.max(0) + 1 + MARGIN)
+    volume = np.bincount(np.ravel_multi_index(cells.T, shape), body.volume.astype(float), np.prod(shape))
+    return gaussian_filter(volume.reshape(shape) / width**3, 1.0), low, width
+
+
+def _cells(body: Body, low: np.ndarray, width: float) -> np.ndarray:
+    """Voxel of every particle, (N, 3)."""
+    return np.floor((body.rest.astype(float) - low) / width).astype(int)

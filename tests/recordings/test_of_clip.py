@@ -1,5 +1,7 @@
 """A clip's artifacts as a recording: the same body, the same boundary, the same points."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from slab import pulled, slab
@@ -55,6 +57,22 @@ def test_the_surface_encloses_the_body():
     low, high = mesh.vertices.min(0), mesh.vertices.max(0)
     assert (np.abs(low - body.rest.min(0)) < 0.6 * body.spacing).all()
     assert (np.abs(high - body.rest.max(0)) < 0.6 * body.spacing).all()
+
+
+def test_held_specks_that_the_surface_leaves_out_hold_nothing(tmp_path):
+    body, *rest = clip()
+    speck = body.rest.min(0) - 3 * body.spacing
+    rows = ("rest", "volume", "color", "held", "surface")
+    twice = {name: np.concatenate([getattr(body, name), getattr(body, name)[:1]]) for name in rows}
+    more = dataclasses.replace(body, **twice)
+    more.rest[-1] = speck
+    more.held[-1], more.surface[-1] = True, False
+    material = dataclasses.replace(rest[0], values=np.ones((len(more.rest), 1), np.float32), held=more.held)
+    found = recording_of("slab", more, material, *rest[1:])
+    assert found.boxes[..., 0].min() > speck[0] + body.spacing
+    # Whoever reads it finds tissue in every box.
+    write_recording(found, tmp_path)
+    assert read_recording(tmp_path).body(body.spacing).held.any()
 
 
 def test_a_clip_without_points_is_refused():

@@ -67,7 +67,9 @@ def bars(case: Diagnosed) -> str | None:
         return None
     shown = [b for b in BARS if any(b[0] in errors for _, errors in groups)]
     if not case.verdict.names:
-        shown = [(key, "law that comes nearest" if key == "after" else words, c) for key, words, c in shown]
+        # Where nothing is named nothing is modelled, as a rule: then there is no second bar.
+        added = any(errors.get("after") != errors.get("before") for _, errors in groups)
+        shown = [(k, "law that comes nearest" if k == "after" else w, c) for k, w, c in shown if k != "after" or added]
     with sheet(6.0 * len(groups), 0.9 + 0.34 * len(shown)) as figure:
         for axes, (name, errors) in zip(
             figure.subplots(1, len(groups), squeeze=False, sharex=True)[0], groups, strict=True
