@@ -43,6 +43,8 @@ SAFETY."""
 SOFTER, ALIKE = 0.7, 2.0
 """How much softer, in log E, another descent begins, and what chi square its end may cost more. Tissue that creeps back
 tells eta / E alone: of bodies that look alike the softest takes the longest steps."""
+ROUNDS, AGAIN = 3, 25.0
+"""Fits at most, and what chi square a run may cost beyond what the last one promised; chosen: 3 where it went well."""
 AFTER = 0.5
 """How long a short run goes on after the release [s]."""
 
@@ -82,30 +84,33 @@ def bounded(x: np.ndarray, clip: Clip) -> np.ndarray:
 
 
 def fit_base(
-    clip: Clip, whiten: Whitener, nuisances: np.ndarray, memo: Memo, *, rounds: int = 1,
+    clip: Clip, whiten: Whitener, nuisances: np.ndarray, memo: Memo, *, rounds: int = ROUNDS,
     say: Callable[[str], None] = lambda text: None,
 ) -> Base:  # fmt: skip
-    """Least squares over E, nu and eta, given nuisances whitened at one standard deviation, (N, M)."""
-    x, until = START.copy(), clip.until
+    """Least squares over E, nu and eta, given nuisances whitened at one standard deviation, (N, M).
+
+    Begun anew, at most `rounds` times, where a run fits worse than the tangent and the short runs before it promised.
+    """
+    x, promised = START.copy(), np.inf
     prepared = clip.prepared(TERMS)
     carry = prepared.simulator.carry(clip.rest)
     space = metric(nuisances)
-    for iteration in range(rounds + 1):
-        last = iteration == rounds
-        say(f"base, run {iteration + 1}: E {np.exp(x[0]):.0f} Pa, nu {x[1]:.3f}, eta {np.exp(x[0] + x[2]):.2f} Pa s")
-        frames = clip.frames if last else until
-        x, (drive, run) = (
-            _standing(prepared, clip, x, memo, frames)
-            if iteration == 0
-            else (x, simulate(prepared, clip, x, memo, frames))
-        )
+    for n in range(rounds + 1):
+        say(f"base, run {n + 1}: E {np.exp(x[0]):.0f} Pa, nu {x[1]:.3f}, eta {np.exp(x[0] + x[2]):.2f} Pa s")
+        if n == 0:
+            x, (drive, run) = _standing(prepared, clip, x, memo, clip.until)
+        else:
+            drive, run = simulate(prepared, clip, x, memo, clip.frames)
         simulated = carried(carry, run)
-        near = tangent(prepared, values_of(x), drive, run, clip.rest, until)
+        near = tangent(prepared, values_of(x), drive, run, clip.rest, clip.until)
         around = _Around(
-            clip, whiten, space, memo, prepared, carry, x, run, simulated[:, :until], _by_poisson(prepared, near, x)
-        )
-        if not last:
-            x = around.softest(say) if iteration == 0 else around.descend(x, say)
+            clip, whiten, space, memo, prepared, carry, x, run, simulated[:, : clip.until],
+            _by_poisson(prepared, near, x),
+        )  # fmt: skip
+        if n > 0 and (n == rounds or around.cost(x, around.left(x)) < promised + AGAIN):
+            break
+        x = around.softest(say) if n == 0 else around.descend(x, say)
+        promised = around.cost(x, around.left(x))
     slopes = around.slopes(x)
     spread = np.sqrt(np.diag(np.linalg.inv(around.normal(slopes))))
     return Base(x, prepared, drive, run, simulated, near, slopes * SPREAD[:, None, None, None], spread)

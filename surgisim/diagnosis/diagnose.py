@@ -70,8 +70,7 @@ def diagnose(
     fitted = None
     if detected:
         refits, fitted = explained_by(case, refits, bend, progress)
-    progress(0.97, 1, "verdict")
-    return verdict.write(case, laws, ranked, refits, fitted, bend)
+    return verdict.write(case, laws, ranked, refits, fitted, bend, lambda text: progress(0.97, 1, text))
 
 
 def compete(case: Case, laws: dict, ranked: list[str], progress: Progress) -> tuple[Case, list[Refit]]:

@@ -1,5 +1,6 @@
 """From fits to a verdict: probabilities, intervals, held-out errors, and what is said in words."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,7 +86,9 @@ def judged(case, laws, refits, fitted: Together, bend) -> Judgement:
     return Judgement(verdict, accepted, chances, effects, float(explained), after, noise, shares)
 
 
-def write(case, laws, ranked, refits, fitted: Together | None, bend) -> tuple[Diagnosis, Physics, Mismatch]:
+def write(
+    case, laws, ranked, refits, fitted: Together | None, bend, say: Callable[[str], None]
+) -> tuple[Diagnosis, Physics, Mismatch]:
     """Everything a diagnosis leaves behind. refits: best first; fitted: of them what may be named, None for nothing."""
     clip, base = case.clip, case.base
     rng = np.random.default_rng([case.settings.seed, 1])
@@ -97,11 +100,14 @@ def write(case, laws, ranked, refits, fitted: Together | None, bend) -> tuple[Di
         said_of = Judgement("nothing detectable", [], nothing, [], 0.0, plain, noise_beside(case, plain), {})
     verdict, effects, chances, named = said_of.verdict, said_of.effects, said_of.chances, said_of.named
     after, noise, explained = said_of.after, said_of.noise, said_of.explained
+    if named:
+        say("a placebo, and what is named on a finer grid")
     wrong = placebo(case, fitted, refits, laws) if named else None
     # What is shown is replayed on a finer grid, where the engine bears it.
     fine = replayed(case, fitted, wrong) if named else None
     shown = fine or Replay(clip, base.simulated, after, None if wrong is None else wrong.moved)
     fit, held_out = errors(case, shown.before, shown.after, shown.placebo, noise.sigma)
+    say("verdict")
     z, reach = symptom(clip, noise, residual(case, base.simulated, False, rest_only=False), rng)
     freed = case.z - case.space.explained(case.z)
     cleared = case.nulls - case.space.explained(case.nulls)

@@ -9,7 +9,7 @@ tissue's. In mm.
     noise_floor   the tracking noise; one number with `oracle`, in which nothing but noise is left
     share         (before - after) / (before - oracle): what the diagnosis cuts of what the oracle would
     share_effect  (before - after) / (oracle_before - oracle): the same over what the effect itself adds
-    placebo_better   whether the placebo's error is smaller, by however little
+    placebo_better   whether the placebo's error is smaller, by however little that single precision tells
     shows         whether the effect is there at all: at least as large as the tracking noise in these frames
 
 The oracle is another solver than the one that diagnoses, so that `share` also counts the engine's own error.
@@ -23,6 +23,8 @@ from surgisim.problem import Problem
 from surgisim.proof.truth import Truth
 from surgisim.recordings.recording import Recording
 
+ALIKE = 1e-5
+"""Errors that differ by less are the same [mm]: positions of 5 cm have steps of 4e-6 mm in single precision."""
 LEAST = 3
 """Frames of rest that an offset is told from; where a point is seen in fewer, from all frames that may be fitted."""
 
@@ -70,7 +72,7 @@ def held_out(truth: Truth, recording: Recording, verdict: Verdict, mismatch: Mis
     result |= {"shows": shows, "share_effect": (before - after) / effect if shows and after is not None else None}
     placebo, said = told.get("placebo"), told.get("after")
     # Both as stated, so that they are measured the same way.
-    result["placebo_better"] = None if placebo is None or said is None else bool(placebo < said)
+    result["placebo_better"] = None if placebo is None or said is None else bool(placebo < said - ALIKE)
     return result
 
 

@@ -139,6 +139,12 @@ def test_the_cut_is_measured_against_the_noise_floor(tmp_path):
     assert errors["before"] == pytest.approx(errors["oracle_before"], rel=1e-4)
 
 
+@pytest.mark.parametrize(("less", "better"), [(0.0, False), (1e-6, False), (1e-4, True), (-1e-4, False)])
+def test_a_placebo_is_better_by_whatever_single_precision_tells(tmp_path, less, better):
+    errors = {"noise_floor": 0.5, "before": 0.95, "after": 0.57, "placebo": 0.57 - less, "unit": "mm"}
+    assert scored(tmp_path, told=diagnosis(held_out=errors))["held_out"]["placebo_better"] is better
+
+
 def test_a_points_constant_offset_is_no_error_but_what_stays_after_a_pull_is():
     away = np.random.default_rng(0).normal(size=(5, 90, 3))
     away[1, 4] = np.nan

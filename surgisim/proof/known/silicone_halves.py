@@ -17,6 +17,12 @@ def convert(folder: Path):
     return hanging(depth, folder / "cantilever_f1494_v749.tet")
 
 
+def direct(folder: Path, progress) -> Found:
+    from surgisim.proof.rigs.hung_bar import concealed_halves
+
+    return concealed_halves(convert(folder), progress)
+
+
 def ask(folder: Path, found: Found) -> list[Answer]:
     answers = [named(found.verdict, LUMPS, "tissue that is stiffer or softer somewhere")]
     lump = next((e for e in found.verdict.effects if e.term in LUMPS), None)
@@ -26,9 +32,12 @@ def ask(folder: Path, found: Found) -> list[Answer]:
     factor = lump.parameters.get("s", {}).get("value")
     if lump.center is None or factor is None:
         return [*answers, Answer("which half is soft", asked, "no place, or no factor, is given", False)]
-    softer = factor < 1
-    got = f"{'softer' if softer else 'stiffer'} by {factor:.2g} at x = {1e3 * lump.center[0]:.0f} mm"
-    return [*answers, Answer("which half is soft", asked, got, softer == (lump.center[0] > 0))]
+    # A part is said to begin at a plane and to lie beyond it, a lump to lie about a point.
+    normal = found.physics.get("places", {}).get(lump.term, {}).get("normal")
+    at_clamp = (normal[0] if normal else lump.center[0]) > 0
+    got = f"{'softer' if factor < 1 else 'stiffer'} by {factor:.2g} {'beyond' if normal else 'at'} "
+    got += f"x = {1e3 * lump.center[0]:.0f} mm"
+    return [*answers, Answer("which half is soft", asked, got, (factor < 1) == at_clamp)]
 
 
 KNOWN = Known(
@@ -36,5 +45,6 @@ KNOWN = Known(
     data="diffcal_silicone",
     concealed="The base is one silicone. The bar is Ecoflex-50 at the clamp and MoldStar-15, twice as stiff, beyond.",
     convert=convert,
+    direct=direct,
     ask=ask,
 )

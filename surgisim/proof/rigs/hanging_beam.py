@@ -33,8 +33,8 @@ WIDER = 1.35
 """The head begins where the outline is this much wider than the bar."""
 APART = 0.0075
 """Of the points along the bar [m]."""
-FPS, FRAMES, SEEN = 10.0, 60, 15
-"""[1/s]; frames in all, and those at the end in which the beam has come to rest."""
+FPS, FRAMES, SEEN = 10.0, 25, 1
+"""[1/s]; frames in all, and those at the end in which the beam has come to rest: there is one picture."""
 SIGMA = 1e-3
 """Two pixels: how well the midline is known [m]."""
 DENSITY = 1080.0

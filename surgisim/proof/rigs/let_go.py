@@ -74,13 +74,13 @@ def simulate(take: Recording, values: Values, places: Mapping[str, Place], spaci
 
 
 def misfit(take: Recording, moved: np.ndarray) -> np.ndarray:
-    """Recorded minus simulated [m], (K, T, 3)."""
+    """Recorded minus simulated [m], (K, T, 3), NaN where unseen."""
     seen = take.points[:, : moved.shape[1]].astype(float) - take.attached()[:, None]
     return seen - moved
 
 
 def rms(left: np.ndarray) -> float:
-    return float(np.sqrt((left**2).sum(-1).mean()))
+    return float(np.sqrt(np.nanmean((left**2).sum(-1))))
 
 
 def alike(take: Recording, frames: int, frequency: float) -> np.ndarray:
@@ -96,8 +96,9 @@ def alike(take: Recording, frames: int, frequency: float) -> np.ndarray:
 
 
 def try_law(
-    law: Law, base: Values, take: Recording, other: Recording, spacing: float, frames: int, weight: np.ndarray
-) -> Tried:
+    law: Law, base: Values, take: Recording, other: Recording, spacing: float, frames: int, weight: np.ndarray,
+    evaluations: int,
+) -> Tried:  # fmt: skip
     """Scan, fit with frames weighted, (frames,), predict the other take."""
 
     def left(x: np.ndarray, on: Recording) -> np.ndarray:
@@ -114,19 +115,21 @@ def try_law(
     x = starts[int(np.argmin(errors))]
     bounds = (np.array(law.low), np.array(law.high)) if law.low else (-np.inf, np.inf)
     found = least_squares(
-        lambda x: 1e3 * (weight[:, None] * left(x, take)).ravel(), x, bounds=bounds,
-        x_scale=np.maximum(np.abs(x), 1e-6), diff_step=DIFFERENCE, max_nfev=EVALUATIONS, xtol=1e-3, ftol=1e-3,
+        lambda x: 1e3 * np.nan_to_num(weight[:, None] * left(x, take)).ravel(), x, bounds=bounds,
+        x_scale=np.maximum(np.abs(x), 1e-6), diff_step=DIFFERENCE, max_nfev=evaluations, xtol=1e-3, ftol=1e-3,
     )  # fmt: skip
     return Tried(law, found.x, rms(left(found.x, take)), rms(left(found.x, other)))
 
 
 def name(
     laws: list[Law], base: Values, take: Recording, other: Recording, spacing: float, seconds: float, progress,
-    swings: float | None = None,
+    swings: float | None = None, other_is: str = "a take that was never fitted",
+    evaluations: int = EVALUATIONS,
 ) -> Found:  # fmt: skip
     """The law under which the other take is predicted best, and how much better than by the base.
 
-    swings: frequency [Hz] of a body all of whose swings shall count alike in a fit; otherwise the largest count most.
+    other_is: what the other take is, in words. swings: frequency [Hz] of a body all of whose swings shall count alike
+    in a fit; otherwise the largest count most.
     """
     frames = round(seconds * take.fps) + 1
     weight = np.ones(frames) if swings is None else alike(take, frames, swings)
@@ -134,7 +137,7 @@ def name(
     tried = []
     for i, law in enumerate(laws):
         progress(i, len(laws), law.name)
-        tried.append(try_law(law, base, take, other, spacing, frames, weight))
+        tried.append(try_law(law, base, take, other, spacing, frames, weight, evaluations))
     tried.sort(key=lambda t: t.other)
     best = tried[0]
     like = [t for t in tried[1:] if t.other < CLOSE * best.other and t.fitted < plain[0]]
@@ -149,8 +152,7 @@ def name(
     held = {"before": 1e3 * plain[1], "after": 1e3 * best.other, "placebo": 1e3 * tried[-1].other}
     said = best.law.name.replace("_", " ")
     words = (
-        f"Without {said} the simulation is {1e3 * plain[1]:.2g} mm off a take that was never fitted, with it "
-        f"{1e3 * best.other:.2g} mm."
+        f"Without {said} the simulation is {1e3 * plain[1]:.2g} mm off {other_is}, with it {1e3 * best.other:.2g} mm."
     )
     behind = [t for t in tried[1:] if t not in like]
     if behind:
@@ -179,7 +181,12 @@ def _physics(base: Values, best: Tried | None, spacing: float, take: Recording) 
             for n, told in every.items()
         },
         "places": {
-            n: {"center": list(map(float, p.center)), "extent": p.extent, "normal": None} for n, p in places.items()
+            n: {
+                "center": list(map(float, p.center)),
+                "extent": p.extent,
+                "normal": None if p.normal is None else list(map(float, p.normal)),
+            }
+            for n, p in places.items()
         },
         "density": take.density,
         "grid": {"spacing": spacing},

@@ -1,0 +1,131 @@
+"""The bar of two silicones put to the engine: what a bar of one silicone lacks.
+
+What is seen is where it came to rest. Drag brings it there within two seconds instead of minutes, and is gone at rest.
+Every law is fitted together with the bar's one modulus, to every other point of the midline; the points between are
+held out, for there is no second picture of this bar hanging.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from surgisim.mpm.setup import Values
+from surgisim.physics.place import Place
+from surgisim.proof.known.catalogue import Found
+from surgisim.proof.rigs.hanging_beam import BAR
+from surgisim.proof.rigs.let_go import Law, misfit, name, rms, simulate
+from surgisim.recordings.recording import Recording
+
+SPACING = 0.009
+"""Three cells across the bar [m]."""
+NU = 0.45
+DRAG = 10.0
+"""[1/s]; nearly critical for the bar's slowest swing."""
+SEEN = 1
+"""Frames at the end in which the bar is at rest."""
+SEAM = 0.002
+"""How gradually one part passes into the other [m]."""
+HEAD, EXTENT = -0.08, 0.01
+"""Middle of the free head along the bar, and extent of what acts in one place [m]."""
+SOFTEST, STIFFEST = 1e4, 1e6
+"""[Pa]"""
+EVALUATIONS = 10
+"""Of a fit; a modulus, a factor and a place follow one another slowly."""
+
+
+def concealed_halves(bar: Recording, progress) -> Found:
+    """Base: one silicone, its modulus from the same picture."""
+    seconds = (bar.frames - 1) / bar.fps
+    fitted, between = (some(bar, slice(k, None, 2)) for k in (0, 1))
+    progress(0, 1, "one silicone")
+    E = one_modulus(fitted)
+    laws = [part(E), head(E), tilt(E), stiffening(E), push(E)]
+    return name(
+        laws,
+        silicone(E),
+        fitted,
+        between,
+        SPACING,
+        seconds,
+        progress,
+        other_is="points between those that were fitted",
+        evaluations=EVALUATIONS,
+    )
+
+
+def some(bar: Recording, which: slice) -> Recording:
+    """Some of its points, seen at the end only."""
+    points, visible = bar.points[which].copy(), bar.visible[which].copy()
+    points[:, :-SEEN], visible[:, :-SEEN] = np.nan, False
+    return dataclasses.replace(bar, points=points, visible=visible, sigma=bar.sigma[which], place=bar.place[which])
+
+
+def silicone(E: float) -> Values:
+    return {"corotated": {"E": float(E), "nu": NU}, "drag": {"c": DRAG}}
+
+
+def one_modulus(bar: Recording) -> float:
+    """The modulus of one silicone with which the bar hangs most nearly as it does [Pa]."""
+
+    def off(log_E: float) -> float:
+        return rms(misfit(bar, simulate(bar, silicone(math.exp(log_E)), {}, SPACING, bar.frames)))
+
+    span = np.log([2 * SOFTEST, STIFFEST / 3])
+    return math.exp(minimize_scalar(off, bounds=span, method="bounded", options={"maxiter": 9, "xatol": 0.05}).x)
+
+
+def _law(term: str, E: float, make, scan, low, high) -> Law:
+    """make: values of the law and its place from its own numbers; the modulus goes before them."""
+
+    def whole(x):
+        values, place = make(x[1:])
+        return {**silicone(x[0]), term: values}, {} if place is None else {term: place}
+
+    return Law(term, whole, ((E,), *scan), (SOFTEST, *low), (STIFFEST, *high))
+
+
+def part(E: float) -> Law:
+    """Stiffer or softer from some place on to the clamp; the modulus is the one there, where the bar bends most."""
+
+    def make(x):
+        factor = float(x[1])
+        beyond = Place((float(x[2]) - BAR / 2, 0.0, 0.0), SEAM, (1.0, 0.0, 0.0))
+        return {**silicone(x[0] / factor), "stiff_inclusion": {"s": factor}}, {"stiff_inclusion": beyond}
+
+    scan = ((E,), (0.4, 2.5), (0.25 * BAR, 0.5 * BAR, 0.75 * BAR))
+    return Law("stiff_inclusion", make, scan, (SOFTEST, 0.06, 0.01), (STIFFEST, 16.0, BAR))
+
+
+def head(E: float) -> Law:
+    """A weight in the free head."""
+    place = Place((HEAD, 0.0, 0.0), EXTENT)
+    return _law("added_mass", E, lambda x: ({"mass": float(x[0])}, place), ((0.01, 0.03),), (1e-5,), (0.2,))
+
+
+def tilt(E: float) -> Law:
+    """A camera that does not hang as was thought."""
+    return _law(
+        "gravity", E, lambda x: ({"x": float(x[0]), "y": 0.0, "z": 0.0, "onset": -1.0}, None),
+        ((-2.0, 2.0),), (-9.0,), (9.0,),
+    )  # fmt: skip
+
+
+def stiffening(E: float) -> Law:
+    return _law("stiffening", E, lambda x: ({"k": float(x[0])}, None), ((0.1 * E, 0.5 * E),), (10.0,), (1e5,))
+
+
+def push(E: float) -> Law:
+    """Something holds it up from below."""
+
+    def make(x):
+        up = {"yaw": 0.0, "pitch": math.pi / 2, "onset": 0.0, "end": 60.0}
+        return {"force": float(x[0]), **up}, somewhere(x[1])
+
+    return _law("hidden_contact", E, make, ((0.05, 0.2), (0.25 * BAR, 0.75 * BAR)), (1e-3, 0.01), (2.0, BAR))
+
+
+def somewhere(along: float) -> Place:
+    """In the middle of the bar, `along` from the free head [m]."""
+    return Place((float(along) - BAR / 2, 0.0, 0.0), EXTENT)
