@@ -77,31 +77,30 @@ def one_modulus(bar: Recording) -> float:
 
 
 def _law(term: str, E: float, make, scan, low, high) -> Law:
-    """make: values of the law and its place from its own numbers; the modulus goes before them."""
+    """make: values of the law and its place from its own numbers; before them goes the modulus over E."""
 
     def whole(x):
         values, place = make(x[1:])
-        return {**silicone(x[0]), term: values}, {} if place is None else {term: place}
+        return {**silicone(x[0] * E), term: values}, {} if place is None else {term: place}
 
-    return Law(term, whole, ((E,), *scan), (SOFTEST, *low), (STIFFEST, *high))
+    return Law(term, whole, ((1.0,), *scan), (SOFTEST / E, *low), (STIFFEST / E, *high))
 
 
 def part(E: float) -> Law:
     """Stiffer or softer from some place on to the clamp; the modulus is the one there, where the bar bends most."""
 
     def make(x):
-        factor = float(x[1])
-        beyond = Place((float(x[2]) - BAR / 2, 0.0, 0.0), SEAM, (1.0, 0.0, 0.0))
-        return {**silicone(x[0] / factor), "stiff_inclusion": {"s": factor}}, {"stiff_inclusion": beyond}
+        values = {**silicone(x[0] * E / x[1]), "stiff_inclusion": {"s": float(x[1])}}
+        return values, {"stiff_inclusion": Place(along(x[2]), SEAM, (1.0, 0.0, 0.0))}
 
-    scan = ((E,), (0.4, 2.5), (0.25 * BAR, 0.5 * BAR, 0.75 * BAR))
-    return Law("stiff_inclusion", make, scan, (SOFTEST, 0.06, 0.01), (STIFFEST, 16.0, BAR))
+    scan = ((1.0,), (0.4, 2.5), (0.25, 0.5, 0.75))
+    return Law("stiff_inclusion", make, scan, (SOFTEST / E, 0.06, 0.08), (STIFFEST / E, 16.0, 1.0))
 
 
 def head(E: float) -> Law:
     """A weight in the free head."""
     place = Place((HEAD, 0.0, 0.0), EXTENT)
-    return _law("added_mass", E, lambda x: ({"mass": float(x[0])}, place), ((0.01, 0.03),), (1e-5,), (0.2,))
+    return _law("added_mass", E, lambda x: ({"mass": 0.1 * float(x[0])}, place), ((0.1, 0.3),), (1e-4,), (2.0,))
 
 
 def tilt(E: float) -> Law:
@@ -113,19 +112,19 @@ def tilt(E: float) -> Law:
 
 
 def stiffening(E: float) -> Law:
-    return _law("stiffening", E, lambda x: ({"k": float(x[0])}, None), ((0.1 * E, 0.5 * E),), (10.0,), (1e5,))
+    return _law("stiffening", E, lambda x: ({"k": E * float(x[0])}, None), ((0.1, 0.5),), (10 / E,), (1e5 / E,))
 
 
 def push(E: float) -> Law:
     """Something holds it up from below."""
+    up = {"yaw": 0.0, "pitch": math.pi / 2, "onset": 0.0, "end": 60.0}
 
     def make(x):
-        up = {"yaw": 0.0, "pitch": math.pi / 2, "onset": 0.0, "end": 60.0}
-        return {"force": float(x[0]), **up}, somewhere(x[1])
+        return {"force": float(x[0]), **up}, Place(along(x[1]), EXTENT)
 
-    return _law("hidden_contact", E, make, ((0.05, 0.2), (0.25 * BAR, 0.75 * BAR)), (1e-3, 0.01), (2.0, BAR))
+    return _law("hidden_contact", E, make, ((0.05, 0.2), (0.25, 0.75)), (1e-3, 0.08), (2.0, 1.0))
 
 
-def somewhere(along: float) -> Place:
-    """In the middle of the bar, `along` from the free head [m]."""
-    return Place((float(along) - BAR / 2, 0.0, 0.0), EXTENT)
+def along(share: float) -> tuple[float, float, float]:
+    """In the middle of the cross-section, from the free head (0) to the clamp (1) [m]."""
+    return (float(share) - 0.5) * BAR, 0.0, 0.0
