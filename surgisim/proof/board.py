@@ -63,6 +63,15 @@ def with_metadata(cases: list[Case], folders: list[Path]) -> dict[str, Any]:
     return board | {"metadata": found}
 
 
+def pooled(boards: list[dict[str, Any]]) -> dict[str, Any]:
+    """One board of the cases of several. Raises Problem where one is no scoreboard, or has a case of another."""
+    for n, board in enumerate(boards):
+        if board.get("format") != FORMAT:
+            raise Problem(f"board {n + 1}: 'format' is {board.get('format')!r}, not {FORMAT!r}. Pass scoreboard.json.")
+    board = scoreboard([case for one in boards for case in one["cases"]])
+    return board | {"seals": sum(one["seals"] for one in boards)}
+
+
 def strong(cases: list[Case]) -> list[Case]:
     """Those with nothing concealed, and those whose effect stands out of the noise."""
     return [c for c in cases if c["kind"] == "nothing" or c["snr"] >= STRONG]

@@ -13,7 +13,7 @@ from proof.test_score import scored
 
 from surgisim.problem import Problem
 from surgisim.proof.ablations import losses
-from surgisim.proof.board import scoreboard, with_metadata
+from surgisim.proof.board import pooled, scoreboard, with_metadata
 from surgisim.proof.calibration import calibration
 from surgisim.proof.case import phases
 from surgisim.proof.chance import chance
@@ -73,6 +73,18 @@ def test_every_case_is_in_the_confusion_once(run):
 def test_a_case_is_not_scored_twice(run):
     with pytest.raises(Problem, match="scored twice"):
         scoreboard([*run[1], run[1][0]])
+
+
+def test_the_boards_of_several_seeds_are_one(run):
+    _, cases = run
+    seeds = [scoreboard(part) | {"seals": 5} for part in (cases[:3], cases[3:])]
+    both, whole = pooled(seeds), scoreboard(cases)
+    assert both["seals"] == 10
+    assert {k: both[k] for k in both if k != "seals"} == {k: whole[k] for k in whole if k != "seals"}
+    with pytest.raises(Problem, match="scored twice"):
+        pooled([seeds[0], seeds[0]])
+    with pytest.raises(Problem, match="board 2: 'format' is None"):
+        pooled([seeds[0], {}])
 
 
 def test_an_interval_of_few_cases_is_wide():

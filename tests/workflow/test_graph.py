@@ -139,7 +139,7 @@ def test_a_mistake_in_the_config_is_one_sentence(tree):
     assert "there is no key 'reconstruction.iteratons'; did you mean 'iterations'?" in tree.says("--dry-run")
 
 
-CONCEALED = {"invent", "seals", "shuffle", "shorten", "diagnosis", "diagnosis_report", "score", "scoreboard"}
+CONCEALED = {"invent", "seals", "shuffle", "shorten", "diagnosis", "diagnosis_report", "score", "scoreboard", "pooled"}
 CONCEALED |= {"known", "known_direct", "known_score", "known_board", "ablations", "recorded"}
 AGAIN = {
     "verification",
@@ -150,7 +150,8 @@ AGAIN = {
     "clip_diagnosis_report",
 }
 """Rules that run the module of another's name."""
-ASKED_FOR = {"blind", "blind_shuffled", "blind_ablations", "blind_phases", "blind_real", "clip_diagnoses"}
+ASKED_FOR = {"blind", "blind_shuffled", "blind_ablations", "blind_phases", "blind_pooled", "blind_real"}
+ASKED_FOR |= {"clip_diagnoses"}
 """Rules without a stage of their own: what `snakemake NAME` makes."""
 
 

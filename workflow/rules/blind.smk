@@ -248,6 +248,40 @@ rule blind:
         f"blind/{SEED}/main/scoreboard.html",
 
 
+rule pooled:
+    input:
+        boards=expand("blind/{seed}/main/scoreboard.json", seed=SEEDS),
+    output:
+        board="blind/pooled/scoreboard.json",
+        table="blind/pooled/scoreboard.csv",
+        page=report(
+            "blind/pooled/scoreboard.html",
+            caption="../report/scoreboard.rst",
+            category="concealed recordings",
+            labels={"seed": "all", "way": "main"},
+        ),
+    log:
+        "logs/blind/pooled.log",
+    benchmark:
+        "benchmarks/blind/pooled.tsv"
+    conda:
+        "../../envs/report.yaml"
+    resources:
+        mem_mb=1000,
+    params:
+        settings=lambda w: json.dumps({"pages": "../{seed}/{case}/main/diagnosis.html"}),
+        code=code("pooled"),
+    shell:
+        'python "$SURGISIM/stages/pooled.py" --boards {input.boards}'
+        " --board {output.board} --table {output.table} --page {output.page}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
+rule blind_pooled:
+    input:
+        "blind/pooled/scoreboard.html",
+
+
 rule blind_shuffled:
     input:
         f"blind/{SEED}/shuffled/scoreboard.html",

@@ -18,7 +18,7 @@ from surgisim.proof.known.catalogue import catalogue as known_recordings
 from surgisim.proof.shuffle import partner
 
 # What the rules for concealed recordings read of the config, beside the clips' choices.
-BLIND = ("seed", "cases", "invent", "diagnosis")
+BLIND = ("seed", "seeds", "cases", "invent", "diagnosis")
 
 try:
     PLAN = plan(
@@ -114,8 +114,9 @@ def benchmarks(w):
     return ":".join(f"benchmarks/{w.clip}/{home}/{stage}.tsv" for stage, home in homes)
 
 
-# Concealed recordings (blind.smk): which seed, how many cases, and the files of each.
+# Concealed recordings (blind.smk): which seed (several on one board: `seeds`), how many cases, and the files of each.
 SEED, COUNT = int(config.get("seed", 1)), int(config.get("cases", 40))
+SEEDS = [int(seed) for seed in config.get("seeds", [SEED])]
 FILES = (
     "recording.json",
     "rest.ply",
