@@ -9,9 +9,8 @@ from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import places
 from surgisim.diagnosis.hypothesis import ease
-from surgisim.diagnosis.laws import Law, respond
+from surgisim.diagnosis.laws import IMPOSSIBLE, Law, respond
 from surgisim.diagnosis.memo import Memo
-from surgisim.mpm.simulator import Breakdown
 
 PULL, HOLD, REST = 0.6, 1.2, 0.8
 """How long a proposed pull takes, holds, and is watched after its release [s]."""
@@ -24,7 +23,7 @@ def separating(clip: Clip, base: Base, first: Law, second: Law, memo: Memo, name
         trial = _instead(clip, motion)
         try:
             seen = [respond(trial, base, replace(law, motion=None), memo) for law in (first, second)]
-        except Breakdown:
+        except IMPOSSIBLE:
             continue
         differ = float(np.sqrt(((seen[0] - seen[1]) ** 2).sum(-1).mean()))
         if best is None or differ > best[0]:
