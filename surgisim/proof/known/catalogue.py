@@ -10,9 +10,32 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from surgisim.artifacts.verdict import Verdict
 from surgisim.problem import Problem
 from surgisim.proof import known
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Curves on one pair of axes: what was recorded and never fitted, the base, and what was named."""
+
+    title: str
+    x: str
+    """Label with its unit, as of y."""
+    y: str
+    recorded: tuple[list[float], list[float]]
+    """Along x and along y, as the others."""
+    base: tuple[list[float], list[float]]
+    named: tuple[list[float], list[float]]
+
+
+def curve(x, y) -> tuple[list[float], list[float]]:
+    """Of a panel, to six digits; what is not finite is left out."""
+    x, y = (np.asarray(values, float) for values in (x, y))
+    seen = np.isfinite(x) & np.isfinite(y)
+    return tuple([float(f"{v:.6g}") for v in values[seen]] for values in (x, y))
 
 
 @dataclass(frozen=True)
@@ -22,6 +45,7 @@ class Found:
     verdict: Verdict
     physics: dict[str, Any]
     """physics.json as it stands."""
+    panels: tuple[Panel, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -89,4 +113,5 @@ def answered(name: str, found: Found, data: Callable[[str], Path]) -> dict[str, 
         "words": found.verdict.words,
         "answers": [asdict(a) for a in answers],
         "direct": case.direct is not None,
+        "panels": [asdict(p) for p in found.panels],
     }

@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from surgisim.mpm.setup import Values
 from surgisim.physics.place import Place
-from surgisim.proof.known.catalogue import Found
+from surgisim.proof.known.catalogue import Found, Panel, curve
 from surgisim.proof.rigs.hanging_beam import BAR
 from surgisim.proof.rigs.let_go import Law, misfit, name, rms, simulate
 from surgisim.recordings.recording import Recording
@@ -52,7 +52,16 @@ def concealed_halves(bar: Recording, progress) -> Found:
         progress,
         other_is="points between those that were fitted",
         evaluations=EVALUATIONS,
+        draw=midline,
     )
+
+
+def midline(bar: Recording, base: np.ndarray, named: np.ndarray) -> Panel:
+    """Where the points came to rest, seen from the side."""
+    seen = bar.points.astype(float) - bar.attached()[:, None]
+    shapes = [1e3 * (bar.attached() + moved[:, -1])[:, :2].T for moved in (seen, base, named)]
+    words = "where the points between those that were fitted came to rest"
+    return Panel(words, "towards the clamp [mm]", "up [mm]", *(curve(*shape) for shape in shapes))
 
 
 def some(bar: Recording, which: slice) -> Recording:

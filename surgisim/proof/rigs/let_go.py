@@ -19,7 +19,7 @@ from surgisim.mpm.setup import Values, prepare
 from surgisim.mpm.simulator import Breakdown
 from surgisim.physics.catalogue import choose
 from surgisim.physics.place import Place
-from surgisim.proof.known.catalogue import Found
+from surgisim.proof.known.catalogue import Found, Panel, curve
 from surgisim.recordings.recording import Recording
 
 CLOSE = 1.10
@@ -29,6 +29,7 @@ FLOOR = 1e-4
 DIFFERENCE = 0.03
 """Relative step of the differences that a fit goes by."""
 
+Draw = Callable[[Recording, np.ndarray, np.ndarray], Panel]
 Make = Callable[[np.ndarray], tuple[Values, dict[str, Place]]]
 
 
@@ -124,16 +125,18 @@ def try_law(
 def name(
     laws: list[Law], base: Values, take: Recording, other: Recording, spacing: float, seconds: float, progress,
     swings: float | None = None, other_is: str = "a take that was never fitted",
-    evaluations: int = EVALUATIONS,
+    evaluations: int = EVALUATIONS, draw: Draw | None = None,
 ) -> Found:  # fmt: skip
     """The law under which the other take is predicted best, and how much better than by the base.
 
     other_is: what the other take is, in words. swings: frequency [Hz] of a body all of whose swings shall count alike
-    in a fit; otherwise the largest count most.
+    in a fit; otherwise the largest count most. draw: the picture of the other take, from it and its displacement under
+    base and named law [m], (K, T, 3); how its liveliest point swings unless said.
     """
     frames = round(seconds * take.fps) + 1
     weight = np.ones(frames) if swings is None else alike(take, frames, swings)
-    plain = [rms(misfit(r, simulate(r, base, {}, spacing, frames))) for r in (take, other)]
+    bare = [simulate(r, base, {}, spacing, frames) for r in (take, other)]
+    plain = [rms(misfit(r, moved)) for r, moved in zip((take, other), bare, strict=True)]
     tried = []
     for i, law in enumerate(laws):
         progress(i, len(laws), law.name)
@@ -158,7 +161,22 @@ def name(
     if behind:
         words += f" The next law, {behind[0].law.name.replace('_', ' ')}, leaves {1e3 * behind[0].other:.2g} mm."
     told = Verdict(take.name, verdict, effects, ranking, None, (), fit, held, None, words)
-    return Found(told, _physics(base, best if pays else None, spacing, take) | {"tried": [_row(t) for t in tried]})
+    values, places = best.law.make(best.x) if pays else ({}, {})
+    moved = simulate(other, {**base, **values}, places, spacing, frames)
+    physics = _physics(base, best if pays else None, spacing, take) | {"tried": [_row(t) for t in tried]}
+    return Found(told, physics, ((draw or swing)(other, bare[1], moved),))
+
+
+def swing(take: Recording, base: np.ndarray, named: np.ndarray) -> Panel:
+    """The take's liveliest point over time, along gravity."""
+    frames = base.shape[1]
+    seen = take.points[:, :frames].astype(float) - take.attached()[:, None]
+    down = np.array(take.gravity or (0.0, 0.0, -1.0))
+    along = [1e3 * moved @ (down / np.linalg.norm(down)) for moved in (seen, base, named)]
+    point = int(np.nanargmax(np.nanstd(along[0], axis=1)))
+    time = np.arange(frames) / take.fps
+    words = "the liveliest point of a take that was never fitted"
+    return Panel(words, "time [s]", "down [mm]", *(curve(time, a[point]) for a in along))
 
 
 def _effect(tried: Tried, share: dict[str, float]) -> Effect:

@@ -16,13 +16,15 @@ from scipy.optimize import least_squares
 from surgisim.artifacts.verdict import Effect, Verdict
 from surgisim.physics.catalogue import Numbers, choose, defaults
 from surgisim.problem import Problem
-from surgisim.proof.known.catalogue import Answer, Found
+from surgisim.proof.known.catalogue import Answer, Found, Panel, curve
 from surgisim.proof.rigs.pressed_cube import Pressed, stress
 from surgisim.recordings.xls import read_xls
 
 SHEETS = ("F_005", "F_01", "F_05", "XF_005", "XF_01", "XF_05")
 """Along (F) and across (XF) the fibres, each at three rates, 0.5, 1 and 5 % a second; the fibres lie along x."""
 RATES = np.array([0, 1, 2, 0, 1, 2])
+UNSEEN = 2
+"""The rate that is shown, left out of the fit: the fastest, along the fibres, and three further across them."""
 BASE = "neo_hookean"
 CANDIDATES = ("relaxation", "relaxation_slow", "fibre", "stiffening", "newtonian", "damage", "plastic_set")
 FIXED = {("neo_hookean", "nu"): 0.48, ("fibre", "yaw"): np.pi / 2, ("fibre", "pitch"): 0.0}
@@ -115,6 +117,24 @@ def diagnose(path: Path, progress=lambda *_: None) -> Found:
     return _found(laws, now, history, ranking, told, seen)
 
 
+def panels(laws: tuple[str, ...], begin: Mapping[str, Numbers], told: Pressed, seen: np.ndarray) -> tuple[Panel, ...]:
+    """Stress over time at the fastest rate, along the fibres and across, predicted from the other rates."""
+    use = RATES != UNSEEN
+    base, named = (
+        stress(choose(names), fit(names, values, told, seen, use).values, told)
+        for names, values in (((BASE,), {}), (laws, begin))
+    )
+    return tuple(
+        Panel(
+            f"the fastest rate, {way} the fibres, predicted from the other two",
+            "time [s]",
+            "pressure [kPa]",
+            *(curve(told.time[test], -1e-3 * values[test]) for values in (seen, base, named)),
+        )
+        for test, way in ((UNSEEN, "along"), (UNSEEN + 3, "across"))
+    )
+
+
 def _found(laws, now: Fit, history, ranking, told: Pressed, seen: np.ndarray) -> Found:
     terms = choose(laws)
     added = laws[1:]
@@ -146,7 +166,7 @@ def _found(laws, now: Fit, history, ranking, told: Pressed, seen: np.ndarray) ->
         "base": stress(choose((BASE,)), fit((BASE,), {}, told, seen, np.ones(len(seen), bool)).values, told).tolist(),
         "named": stress(terms, now.values, told).tolist(),
     }
-    return Found(verdict, physics)
+    return Found(verdict, physics, panels(laws, now.values, told, seen))
 
 
 def ask(folder: Path, found: Found) -> list[Answer]:
