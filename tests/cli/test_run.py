@@ -101,6 +101,13 @@ def test_a_new_operation_is_a_variant_that_shares_everything_before_the_simulati
     assert sorted(started) == [f"would run {stage} demo/pull_more" for stage in ("evaluation", "report", "simulation")]
 
 
+def test_a_clip_may_be_diagnosed_too(tree):
+    done = tree.surgisim("run", "phantom", "--name", "mine", "--out", "there", "--diagnose", "-n")
+    added = {line for line in done.stdout.splitlines() if "diagnosis" in line or "recorded" in line}
+    assert added == {f"would run {job} mine/main" for job in ("recorded", "clip_diagnosis", "clip_diagnosis_report")}
+    assert "would run report mine/main" in done.stdout
+
+
 def test_a_package_without_its_checkout_says_what_to_do(tree, tmp_path, monkeypatch):
     monkeypatch.setenv("SURGISIM_HOME", str(tmp_path / "empty"))
     assert "Install from a checkout" in sentence(tree.surgisim("demo", "--out", "there"))
