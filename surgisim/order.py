@@ -180,7 +180,7 @@ def _answer(console: Console, todo: Plan, out: Path, code: int, state: State, or
             if fit.is_file():
                 console.print(f"         {escape(load(Fit, fit).words)}", soft_wrap=True)
             diagnosis = out / "results" / clip / variant / "diagnosis"
-            if (diagnosis / "diagnosis.html").is_file():
+            if order.diagnose and (diagnosis / "diagnosis.html").is_file():
                 console.print(f"lacks    {escape(str(diagnosis / 'diagnosis.html'))}")
                 words = read_verdict(diagnosis / "diagnosis.json").words
                 console.print(f"         {escape(words)}", soft_wrap=True)

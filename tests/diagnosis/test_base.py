@@ -42,3 +42,15 @@ def test_tissue_that_creeps_back_is_taken_for_the_softest_that_would(monkeypatch
     assert np.exp(case.base.x[0]) < 0.7 * np.exp(other.base.x[0])
     costs = [float(case.space.gram(c.z[:, None], c.z[:, None])[0, 0]) for c in (case, other)]
     assert costs[0] - costs[1] < fitting.ALIKE
+
+
+def test_a_base_is_fitted_anew_where_a_run_fits_worse_than_promised(monkeypatch):
+    def runs() -> int:
+        said = []
+        clip = clip_of(recording(), share=GRID)
+        prepare_case(clip, Diagnosing(grid=GRID, nulls=8), Memo(None, ""), lambda *told: said.append(told[-1]))
+        return sum("base, run" in text for text in said)
+
+    assert runs() == 2
+    monkeypatch.setattr(fitting, "AGAIN", -np.inf)
+    assert runs() == fitting.ROUNDS + 1

@@ -8,6 +8,7 @@ from proof import made_up
 
 from surgisim.proof.rigs import let_go
 from surgisim.proof.rigs.let_go import Law, name
+from surgisim.report.board.known import page
 
 FPS = made_up.FPS
 
@@ -55,6 +56,10 @@ def test_the_law_that_was_left_out_is_named_with_its_number(engine, decay, sag, 
     value = told.physics["terms"][law]["eta" if law == "newtonian" else "z"]["value"]
     assert value == pytest.approx(1e3 * (decay or sag), rel=0.02)
     assert told.verdict.held_out["after"] < 0.05 * told.verdict.held_out["before"]
+    (swing,) = told.panels
+    assert np.ptp(swing.recorded[1]) == pytest.approx(np.ptp(swing.named[1]), rel=0.02)
+    shown = {"case": "r", "title": "R", "concealed": "", "verdict": "named", "words": "", "answers": [], "direct": True}
+    assert b"<img" in page([{**shown, "panels": [dataclasses.asdict(swing)]}])
 
 
 def test_where_no_law_helps_none_is_named(engine, monkeypatch):

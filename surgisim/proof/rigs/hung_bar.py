@@ -1,6 +1,6 @@
 """The bar of two silicones put to the engine: what a bar of one silicone lacks.
 
-What is seen is where it came to rest. Drag brings it there within two seconds instead of minutes, and is gone at rest.
+What is seen is where it came to rest. Drag brings it there in little time, and is gone at rest.
 Every law is fitted together with the bar's one modulus, to every other point of the midline; the points between are
 held out, for there is no second picture of this bar hanging.
 """
@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from surgisim.mpm.setup import Values
 from surgisim.physics.place import Place
 from surgisim.proof.known.catalogue import Found, Panel, curve
-from surgisim.proof.rigs.hanging_beam import BAR
+from surgisim.proof.rigs.hanging_beam import BAR, SEEN
 from surgisim.proof.rigs.let_go import Law, misfit, name, rms, simulate
 from surgisim.recordings.recording import Recording
 
@@ -22,9 +22,7 @@ SPACING = 0.009
 """Three cells across the bar [m]."""
 NU = 0.45
 DRAG = 10.0
-"""[1/s]; nearly critical for the bar's slowest swing."""
-SEEN = 1
-"""Frames at the end in which the bar is at rest."""
+"""[1/s]; with 8 a bar of 80 kPa is within .5 mm of rest after 2 s."""
 SEAM = 0.002
 """How gradually one part passes into the other [m]."""
 HEAD, EXTENT = -0.08, 0.01

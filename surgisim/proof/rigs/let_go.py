@@ -75,7 +75,9 @@ def simulate(take: Recording, values: Values, places: Mapping[str, Place], spaci
 
 
 def misfit(take: Recording, moved: np.ndarray) -> np.ndarray:
-    """Recorded minus simulated [m], (K, T, 3), NaN where unseen."""
+    """Recorded minus simulated [m], (K, T, 3), NaN where unseen and nowhere else. Raises Breakdown."""
+    if not np.isfinite(moved).all():
+        raise Breakdown("a body let go has points that are nowhere. Take a smaller step or a softer tissue.")
     seen = take.points[:, : moved.shape[1]].astype(float) - take.attached()[:, None]
     return seen - moved
 
@@ -106,6 +108,7 @@ def try_law(
         values, places = law.make(x)
         return misfit(on, simulate(on, {**base, **values}, places, spacing, frames))
 
+    seen = np.isfinite(take.points[:, :frames]).all(-1)
     starts = [np.array(x) for x in itertools.product(*law.scan)]
     errors = []
     for x in starts:
@@ -116,7 +119,7 @@ def try_law(
     x = starts[int(np.argmin(errors))]
     bounds = (np.array(law.low), np.array(law.high)) if law.low else (-np.inf, np.inf)
     found = least_squares(
-        lambda x: 1e3 * np.nan_to_num(weight[:, None] * left(x, take)).ravel(), x, bounds=bounds,
+        lambda x: 1e3 * (weight[:, None] * left(x, take))[seen].ravel(), x, bounds=bounds,
         x_scale=np.maximum(np.abs(x), 1e-6), diff_step=DIFFERENCE, max_nfev=evaluations, xtol=1e-3, ftol=1e-3,
     )  # fmt: skip
     return Tried(law, found.x, rms(left(found.x, take)), rms(left(found.x, other)))
