@@ -29,7 +29,9 @@ NEAR = 0.10
 FINE_RUNS = 4
 """At most."""
 WEAKER = 0.8
-"""Times the strength of two effects that tissue does not bear at once, again and again until it does."""
+"""Times the strength of two effects that tissue does not bear at once, again and again until it does; likewise of pulls."""
+SHORTER = 5
+"""How often pulls are shortened at most."""
 
 
 @dataclass(frozen=True)
@@ -64,12 +66,12 @@ def invent(settings: Invent, progress: Progress | None = None, names: tuple[str,
     Raises Problem when no place is found where the tissue bears the effect.
     """
     spacings = settings.spacing, settings.spacing_coarse
-    scene = draw(generator(settings, "scene"), fps=settings.fps, points=settings.points, spacings=spacings)
-    plain = follow(model(scene, settings.spacing), progress, "moving the tissue without the effect")
+    drawn = draw(generator(settings, "scene"), fps=settings.fps, points=settings.points, spacings=spacings)
+    scene, (plain, quick) = borne(drawn, spacings, progress)
     free = nuisance.visible(scene, plain, generator(settings, "visible"))
     if names is None:
         names = concealed(settings.seed, settings.case, tuple(settings.only), settings.faint)
-    true, aims = _with_effects(settings, scene, names, plain, free, progress)
+    true, aims = _with_effects(settings, scene, names, plain, quick, free, progress)
     seen = nuisance.seen(scene, true, settings.noise, generator(settings, "noise"))
     name = name_of(settings.seed, settings.case)
     files = folder.recording(scene, name, seen, free, settings.noise, model(scene, settings.spacing))
@@ -89,13 +91,35 @@ def ratio(settings: Invent, scene: Scene, difference: np.ndarray, free: np.ndarr
     return signal(difference[:, span], free[:, span]) / max(settings.noise, 1e-9)
 
 
-def _with_effects(settings, scene, names, plain, free, progress) -> tuple[np.ndarray, tuple[Aim, ...]]:
-    """Paths with the effects, and the effects."""
+def borne(
+    scene: Scene, spacings: tuple[float, float], progress: Progress | None
+) -> tuple[Scene, tuple[np.ndarray, np.ndarray]]:
+    """The scene, its pulls shortened until they tear nothing, and its paths without effects [m], (K, T, 3).
+
+    Paths are those in elements of either spacing [m]. Raises Problem where even short pulls tear them.
+    """
+
+    def paths() -> tuple[np.ndarray, np.ndarray]:
+        fine, quick = (model(scene, spacing) for spacing in spacings)
+        return (
+            follow(fine, progress, "moving the tissue without the effect"),
+            follow(quick, progress, "a quick run without the effect"),
+        )
+
+    for _ in range(SHORTER):
+        try:
+            return scene, paths()
+        except Problem:
+            scene = scene.pulled(WEAKER)
+    return scene, paths()
+
+
+def _with_effects(settings, scene, names, plain, quick, free, progress) -> tuple[np.ndarray, tuple[Aim, ...]]:
+    """Paths with the effects, and the effects. plain, quick: paths without them in fine and in coarse elements."""
     if not names:
         return plain, ()
     rng = generator(settings, "effect")
     coarse = model(scene, settings.spacing_coarse)
-    coarse_plain = follow(coarse, progress, "a quick run without the effect")
 
     def measure(*hidden: Hidden) -> float:
         try:
@@ -103,7 +127,7 @@ def _with_effects(settings, scene, names, plain, free, progress) -> tuple[np.nda
         except Problem:
             # The tissue does not bear it.
             return math.inf
-        return ratio(settings, scene, moved - coarse_plain, free)
+        return ratio(settings, scene, moved - quick, free)
 
     aims = tuple(_aim(settings, scene, name, rng, measure) for name in names)
     # Fine elements answer a little differently from coarse ones; one factor for all effects mends that.

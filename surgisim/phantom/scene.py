@@ -1,7 +1,7 @@
 """A block of tissue that is pulled, held, let go, and pulled again elsewhere: what a seed decides."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,6 +61,11 @@ class Scene:
     def end_of_fit(self) -> float:
         """[s]"""
         return self.split / self.fps
+
+    def pulled(self, share: float) -> "Scene":
+        """The same with pulls of this share of their length."""
+        first, second = (replace(hold, pull=share * hold.pull) for hold in self.holds)
+        return replace(self, holds=(first, second))
 
 
 def draw(rng: np.random.Generator, *, fps: float, points: int, spacings: tuple[float, ...]) -> Scene:

@@ -12,9 +12,11 @@ import pytest
 
 from surgisim.config.invent import Invent
 from surgisim.phantom import nuisance, seal
-from surgisim.phantom.blind import Aim, at_once, invent, name_of
+from surgisim.phantom.blind import Aim, at_once, borne, invent, name_of
 from surgisim.phantom.effect import Hidden, catalogue
+from surgisim.phantom.follow import follow
 from surgisim.phantom.mixture import concealed
+from surgisim.phantom.model import model
 from surgisim.phantom.scene import draw
 from surgisim.phantom.snr import scaled
 from surgisim.problem import Problem
@@ -200,3 +202,17 @@ def test_two_effects_that_tissue_does_not_bear_at_once_are_weaker():
     assert [a.hidden.magnitude for a in weaker] == pytest.approx([8.0 * 0.8**2, 0.9 * 0.8**2])
     assert [a.alone for a in weaker] == pytest.approx([0.8**2, 0.8**2])
     assert at_once(weaker, measure) == (weaker, ratio)
+
+
+def test_pulls_that_tear_tissue_are_shortened_and_others_are_not():
+    spacings = QUICK.spacing, QUICK.spacing_coarse
+    scene = draw(np.random.default_rng(5), fps=QUICK.fps, points=QUICK.points, spacings=spacings)
+    assert borne(scene, spacings, None)[0] == scene
+    far = scene.pulled(6.0)
+    with pytest.raises(Problem, match="inside out"):
+        follow(model(far, QUICK.spacing))
+    shorter, paths = borne(far, spacings, None)
+    share = [np.linalg.norm(s.pull) / np.linalg.norm(f.pull) for s, f in zip(shorter.holds, far.holds, strict=True)]
+    assert share[0] == pytest.approx(share[1])
+    assert math.log(share[0]) / math.log(0.8) == pytest.approx(round(math.log(share[0]) / math.log(0.8)))
+    assert all(np.isfinite(path).all() for path in paths)
