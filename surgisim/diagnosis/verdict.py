@@ -11,6 +11,7 @@ from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.diagnosis import calibration, words
 from surgisim.diagnosis.clip import PHASES
+from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.errors import errors, residual, rms
 from surgisim.diagnosis.experiment import separating
 from surgisim.diagnosis.flexible import flexible
@@ -62,6 +63,7 @@ def judged(case, laws, refits, fitted: Together, bend) -> Judgement:
         "left": still(case, bend, after),
         "gain": fitted.gain,
         "predicted": predicted(case, after, noise.sigma),
+        "outward": max((out for out, _ in pushes(case.clip.recording, accepted)), default=None),
     }
     explained = max(shares["gained"], shares["taken"])
     verdict = "named"
@@ -120,7 +122,7 @@ def write(
         effects[0]["separating_experiment"] = separating(
             clip, base, *pair, case.memo, (refits[0].term, refits[1].term), rng
         )
-    said = _words(case, verdict, refits, said_of.accepted, effects, explained, laws, z)
+    said = _words(case, said_of, refits, laws, z)
     above = detectable(case, laws)
     diagnosis = Diagnosis(
         recording=clip.recording.name,
@@ -191,11 +193,26 @@ def doubtful(term: str, shares: dict[str, float | None]) -> bool:
     """Whether a law that explains enough is not to be believed all the same.
 
     A push of free place, direction and course follows whatever comes and goes: only where it leaves next to nothing is
-    it one. And no law is believed that leaves a large misfit on other frames as it was.
+    it one, and only where it presses on a surface; what draws tissue outward holds it. And no law is believed that
+    leaves a large misfit on other frames as it was.
     """
+    if draws(shares):
+        return True
     if term == "hidden_contact" and shares["left"] > calibration.PUSH_LEAVES:
         return True
     return shares["predicted"] is not None and shares["predicted"] < calibration.PREDICTED
+
+
+def draws(shares: dict[str, float | None]) -> bool:
+    """Whether an unseen push that would be named draws tissue out of its surface, as no contact can."""
+    return shares["outward"] is not None and shares["outward"] > calibration.PULLS
+
+
+def pushes(recording, accepted: list) -> list[tuple[float, Hypothesis]]:
+    """Unseen pushes among laws, and how far they point out of the tissue."""
+    mine = [r for r in accepted if r.term == "hidden_contact"]
+    found = [(r.finding.hypothesis, r.amplitude) for r in mine]
+    return [(outward(recording, h.place, amplitude), h) for h, amplitude in found]
 
 
 def pays(case, bend, one: Together, both: Together) -> bool:
@@ -323,15 +340,18 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
     return result
 
 
-def _words(case, verdict, refits, accepted, effects, explained, laws, z) -> str:
+def _words(case, said_of: Judgement, refits, laws, z) -> str:
+    verdict, explained = said_of.verdict, said_of.explained
     if verdict == "nothing detectable":
         return words.nothing(1e-3 * detectable(case, laws)[0])
+    if verdict == "unexplained" and draws(said_of.shares):
+        return words.drawn(max(pushes(case.clip.recording, said_of.accepted), key=lambda push: push[0])[1])
     if verdict == "unexplained":
         k, t = np.unravel_index(np.argmax(z[:, : case.clip.until]), (len(z), case.clip.until))
         when = f"at {t / case.clip.fps:.2g} s ({PHASES[case.clip.phases()[t]]})"
         return words.unexplained(refits[0].term, 1 - explained, when, case.clip.rest[k].tolist())
-    found = zip(accepted, effects, strict=True)
+    found = zip(said_of.accepted, said_of.effects, strict=True)
     said = words.sentence([(r.finding.hypothesis, e["parameters"], r.finding.size) for r, e in found], explained)
     if verdict == "equivalence class":
-        said += f" {effects[0]['runners_up'][0]['term']} would look nearly the same."
+        said += f" {said_of.effects[0]['runners_up'][0]['term']} would look nearly the same."
     return said

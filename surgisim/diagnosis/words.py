@@ -72,5 +72,15 @@ def unexplained(best: str, left: float, when: str, where: list[float]) -> str:
     )
 
 
+def drawn(h: Hypothesis) -> str:
+    """h: a push that points out of the tissue."""
+    at = ", ".join(f"{1e3 * c:.0f}" for c in h.place.center)
+    return (
+        f"Something unseen draws the tissue out of its surface near ({at}) mm from {_moment(h.onset)} to "
+        f"{_moment(h.end)}; a contact could only press on it, and no law of the catalogue does that. "
+        "A second grip or a stitch that was not recorded would; mark it as a grip and diagnose again."
+    )
+
+
 def _moment(seconds: float | None) -> str:
     return "the end" if seconds is None else f"{seconds:.2g} s"

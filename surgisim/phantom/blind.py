@@ -29,7 +29,7 @@ NEAR = 0.10
 FINE_RUNS = 4
 """At most."""
 WEAKER = 0.8
-"""Times the strength of two effects that tissue does not bear at once, again and again until it does; likewise of pulls."""
+"""Times the strength of two effects that tissue does not bear at once, and of pulls, again and again until it does."""
 SHORTER = 5
 """How often pulls are shortened at most."""
 

@@ -1,0 +1,67 @@
+"""What presses on a surface may be a contact; what draws tissue out of it is none."""
+
+import numpy as np
+import pytest
+from planted import BLOB, GRID, block, recording
+
+from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis.contact import outward
+from surgisim.diagnosis.diagnose import diagnose
+from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.verdict import doubtful
+from surgisim.physics.place import Place
+from surgisim.recordings.mesh import Mesh
+from surgisim.recordings.recording import Recording, no_grips
+
+TOP = Place((0.0, 0.0, 0.010), 0.003)
+
+
+def body(mesh=None, boxes=True) -> Recording:
+    held = np.array([[[-0.1, -0.1, -1.0], [0.1, 0.1, 0.0025]]])
+    return Recording(
+        name="still", fps=10.0, mesh=mesh or block(), boxes=held if boxes else held[:0],
+        points=np.zeros((1, 2, 3), np.float32), visible=np.ones((1, 2), bool), sigma=np.ones(1), motion=no_grips(2),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("force", "out"), [((0, 0, 2.0), 1.0), ((0, 0, -0.1), -1.0), ((3.0, 0, 0), 0.0)])
+def test_out_of_the_surface_is_up_into_it_is_down_and_along_it_is_neither(force, out):
+    assert outward(body(), TOP, np.array(force)) == pytest.approx(out, abs=0.02)
+
+
+def test_a_side_may_be_pressed_on_from_its_side_alone():
+    rim = Place((0.0165, 0.0, 0.006), 0.002)
+    assert outward(body(), rim, np.array([-1.0, 0, 0])) < -0.8
+    assert outward(body(), rim, np.array([1.0, 0, 0])) > 0.8
+
+
+def test_a_thin_flap_may_be_pressed_on_from_both_sides():
+    thin = Mesh(block().vertices * [1, 1, 0.15], block().faces)
+    here = Place((0.0, 0.0, 0.0009), 0.003)
+    assert outward(body(thin, boxes=False), here, np.array([0, 0, 1.0])) == pytest.approx(0.0, abs=0.05)
+    # Held from below it has one free side.
+    assert outward(body(thin), here, np.array([0, 0, 1.0])) == 0.0
+
+
+def test_deep_inside_nothing_is_said():
+    thick = Mesh(block().vertices * [10, 10, 10], block().faces)
+    assert outward(body(thick, boxes=False), Place((0.0, 0.0, 0.06), 0.003), np.array([0, 0, 1.0])) == 0.0
+
+
+def test_what_draws_tissue_outward_is_not_called_a_contact():
+    settings = Diagnosing(grid=GRID, nulls=8, experiment=False, free=0, second=False)
+    push = {"hidden_contact": {"force": 0.12, "yaw": 0.3, "pitch": 0.2, "onset": 0.7, "end": 1.4}}
+    planted = recording(push, {"hidden_contact": BLOB})
+    drawn, physics, _ = diagnose(planted, settings, lambda *_: None, Memo(None, ""))
+    assert drawn.global_test["outward"] > 0.5
+    assert drawn.verdict == "unexplained"
+    assert drawn.effects[0]["probability"] < 0.5
+    assert "hidden_contact" not in physics.terms
+    assert "draws the tissue out of its surface near" in drawn.words
+
+
+@pytest.mark.parametrize(
+    ("outwards", "left", "doubted"), [(-0.8, 0.05, False), (0.5, 0.05, True), (None, 0.05, False), (-0.8, 0.4, True)]
+)
+def test_a_push_is_doubted_where_it_draws_or_leaves_much(outwards, left, doubted):
+    assert doubtful("hidden_contact", {"outward": outwards, "left": left, "predicted": None}) == doubted
