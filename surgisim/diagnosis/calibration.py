@@ -35,7 +35,7 @@ PUSH_LEAVES = 0.25
 """Share of the explainable misfit that a push may leave: pushes leave 0 to .05, swellings and a twist .29 to .48."""
 PULLS = 0.2
 """How far out of a surface (contact.outward) a push may point and still be a contact's: directions are found within
-8 degrees, contacts at -.94 to -.2, second grips at .34 to .93 (seed 906)."""
+8 degrees, contacts at -.94 to -.17, second grips at .34 to .93 (seed 906)."""
 SHOWS = 1.6
 """Times the noise beyond which a misfit on held-out frames must be cut by a law that is right."""
 PREDICTED = 0.15
