@@ -344,7 +344,7 @@ def _words(case, said_of: Judgement, refits, laws, z) -> str:
     verdict, explained = said_of.verdict, said_of.explained
     if verdict == "nothing detectable":
         return words.nothing(1e-3 * detectable(case, laws)[0])
-    if verdict == "unexplained" and draws(said_of.shares):
+    if verdict == "unexplained" and draws(said_of.shares) and said_of.shares["left"] <= calibration.PUSH_LEAVES:
         return words.drawn(max(pushes(case.clip.recording, said_of.accepted), key=lambda push: push[0])[1])
     if verdict == "unexplained":
         k, t = np.unravel_index(np.argmax(z[:, : case.clip.until]), (len(z), case.clip.until))
