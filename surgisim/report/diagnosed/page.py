@@ -70,7 +70,8 @@ def cards(case: Diagnosed) -> list[Card]:
         beside = "RMS over the tracked points: what is weaker is not seen in this clip"
         rows.append(Card("Detectable above", shown(verdict.detectable_above), "mm", beside, "", "plain"))
     if verdict.unexplained is not None:
-        beside = "of the whitened misfit, by nothing that is named"
+        nearest = "by nothing that is named" if verdict.names else "even by the law that comes nearest"
+        beside = f"of the whitened misfit, {nearest}"
         rows.append(Card("Left unexplained", f"{100 * verdict.unexplained:.0f}", "%", beside, "", "plain"))
     return rows
 
