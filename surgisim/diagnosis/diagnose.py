@@ -22,7 +22,7 @@ from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
 from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
 from surgisim.diagnosis.sharpen import finer
-from surgisim.diagnosis.together import Together, together
+from surgisim.diagnosis.together import Together, needed, together
 from surgisim.recordings.recording import Recording
 
 Progress = Callable[[float, float, str], None]
@@ -201,10 +201,10 @@ def explained_by(case: Case, refits: list[Refit], bend: Flexible, progress: Prog
     both = max(tried, key=lambda t: t.gain, default=None)
     if both is None or not verdict.pays(case, bend, one, both):
         return refits, replace(one, beside=both)
-    first = next(r for r in refits if r.term == both.refits[0].term)
+    said = needed(case, both)
     # Beside its second, the first is as evident as the two are together.
-    first = replace(first, log_evidence=refits[0].log_evidence + 0.5 * (both.gain - one.gain))
-    return [first, *(r for r in refits if r.term != first.term)], replace(both, beside=one)
+    first = replace(said.refits[0], log_evidence=refits[0].log_evidence + 0.5 * (said.gain - one.gain))
+    return [first, *(r for r in refits if r.term != first.term)], replace(said, beside=one)
 
 
 def promise(pair: list[Refit]) -> float:

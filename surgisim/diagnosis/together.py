@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cho_solve
 
+from surgisim.diagnosis import calibration
 from surgisim.diagnosis.base import SPREAD, Base, bounded, carried, simulate
 from surgisim.diagnosis.errors import rms
 from surgisim.diagnosis.laws import IMPOSSIBLE, Clash, joined, law_of, respond
@@ -58,6 +59,40 @@ def together(case, refits: list, say: Callable[[str], None], *, free: bool) -> T
     if len(tried) == 1:
         tried += _moved(case, refits)
     return min(tried, key=lambda t: rms(case, t.moved)[0])
+
+
+def needed(case, both: Together) -> Together:
+    """Laws fitted together, without one that no longer says anything beside the others.
+
+    Of two, the one found first may have stood for the other: beside it, it comes out as next to nothing. The laws that
+    stay keep their numbers and the base, so that what goes is said to gain no less than it does. A law goes where that
+    is no more than a second law must gain to be named.
+    """
+    if len(both.refits) < 2:
+        return both
+    fewer = [one for r in both.refits for one in _without(case, both, r)]
+    best = max(fewer, key=lambda t: t.gain, default=None)
+    if best is None or 0.5 * (both.gain - best.gain) > least(best):
+        return both
+    return best
+
+
+def least(one: Together) -> float:
+    """log evidence that a law must add beside `one`: what its signature has wrong must not pass for another law."""
+    return calibration.THRESHOLD + calibration.FITTED_MISFIT * one.gain
+
+
+def _without(case, both: Together, out) -> list[Together]:
+    kept, base = [r for r in both.refits if r is not out], case.base
+    try:
+        law = joined([law_of(r.finding.hypothesis, r.amplitude, case.clip) for r in kept])
+        moved = respond(case.clip, replace(base, x=both.x), law, case.memo)
+    except IMPOSSIBLE:
+        return []
+    alone = prediction(case, kept, moved, both.x)
+    response = moved - base.simulated
+    mine = [replace(r, response=response, gain=alone.gain, x=both.x) for r in kept]
+    return [replace(alone, refits=mine)] if len(mine) == 1 else [alone]
 
 
 def _freed(case, refits: list, say) -> list[Together]:

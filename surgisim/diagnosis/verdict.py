@@ -22,7 +22,7 @@ from surgisim.diagnosis.model import base_numbers, physics
 from surgisim.diagnosis.noise import Noise, estimate
 from surgisim.diagnosis.placebo import placebo
 from surgisim.diagnosis.replay import Replay, replayed
-from surgisim.diagnosis.together import Together
+from surgisim.diagnosis.together import Together, least
 
 RUNNERS = 4
 """Other laws that an effect lists."""
@@ -218,9 +218,7 @@ def pushes(recording, accepted: list) -> list[tuple[float, Hypothesis]]:
 def pays(case, bend, one: Together, both: Together) -> bool:
     """Whether a second law fitted together with the first says enough to be named beside it."""
     rest, left = (still(case, bend, t.moved) for t in (one, both))
-    # What the first law's signature has wrong must not pass for a second law.
-    least = calibration.THRESHOLD + calibration.FITTED_MISFIT * one.gain
-    return left < (1 - calibration.SECOND) * rest and 0.5 * (both.gain - one.gain) > least
+    return left < (1 - calibration.SECOND) * rest and 0.5 * (both.gain - one.gain) > least(one)
 
 
 def still(case, bend, after: np.ndarray) -> float:

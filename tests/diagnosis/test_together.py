@@ -5,16 +5,16 @@ import pytest
 from planted import GRID, recording
 
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis import verdict
+from surgisim.diagnosis import calibration, verdict
 from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.diagnose import prepare_case
 from surgisim.diagnosis.errors import rms
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import law_of, respond
+from surgisim.diagnosis.laws import joined, law_of, respond
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.refit import Refit
-from surgisim.diagnosis.together import Together, together
+from surgisim.diagnosis.together import Together, needed, prediction, together
 
 WEIGHT, AXIS, TURN = np.array([6.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), 0.25
 
@@ -49,6 +49,31 @@ def test_laws_that_are_fitted_together_do_not_make_up_for_each_other(case):
     assert abs(both.refits[1].finding.hypothesis.about["axis"] @ AXIS) > np.cos(0.5 * TURN)
     assert len(both.refits[0].draws) == len(both.refits[1].draws) > 0
     assert any("gravity and fibre" in text for text in said)
+
+
+def test_a_law_that_came_out_as_nothing_is_dropped_and_one_that_says_something_is_not(case, monkeypatch):
+    weight = found(case, Hypothesis("gravity", np.eye(3), 0, None, 0.0), WEIGHT)
+    strand = found(
+        case, Hypothesis("fibre", np.eye(1), 1, None, None, None, {"k2": 0.5, "axis": AXIS}), np.array([4e3])
+    )
+    nothing = found(case, Hypothesis("stiffening", np.eye(1), 1), np.array([1e-6]))
+
+    def fitted(*refits):
+        law = joined([law_of(r.finding.hypothesis, r.amplitude, case.clip) for r in refits])
+        return prediction(case, list(refits), respond(case.clip, case.base, law, case.memo), None)
+
+    idle = fitted(nothing, weight)
+    kept = needed(case, idle)
+    assert [r.term for r in kept.refits] == ["gravity"]
+    assert kept.gain == pytest.approx(idle.gain, abs=1.0)
+    assert case.base.simulated + kept.refits[0].response == pytest.approx(kept.moved)
+    both = fitted(strand, weight)
+    # So little of the strands shows in a pull that hardly runs along them: they stay or go with what is asked.
+    assert 0.5 * (both.gain - fitted(weight).gain) == pytest.approx(9.3, abs=3.0)
+    monkeypatch.setattr(calibration, "THRESHOLD", 3.0)
+    assert needed(case, both) is both
+    monkeypatch.setattr(calibration, "THRESHOLD", 25.0)
+    assert [r.term for r in needed(case, both).refits] == ["gravity"]
 
 
 @pytest.mark.parametrize(
