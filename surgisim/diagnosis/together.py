@@ -62,16 +62,13 @@ def together(case, refits: list, say: Callable[[str], None], *, free: bool) -> T
 
 
 def needed(case, both: Together) -> Together:
-    """Laws fitted together, without one that no longer says anything beside the others.
+    """Two laws fitted together, or one of them alone where the other says nothing beside it.
 
-    Of two, the one found first may have stood for the other: beside it, it comes out as next to nothing. The laws that
-    stay keep their numbers and the base, so that what goes is said to gain no less than it does. A law goes where that
-    is no more than a second law must gain to be named.
+    The one found first may have stood for the other: beside it, it comes out as next to nothing. The law that stays
+    keeps its numbers and the base, so that what goes is said to gain no less than it does. A law goes where that is no
+    more than a second law must gain to be named.
     """
-    if len(both.refits) < 2:
-        return both
-    fewer = [one for r in both.refits for one in _without(case, both, r)]
-    best = max(fewer, key=lambda t: t.gain, default=None)
+    best = max((one for r in both.refits for one in _alone(case, both, r)), key=lambda t: t.gain, default=None)
     if best is None or 0.5 * (both.gain - best.gain) > least(best):
         return both
     return best
@@ -82,17 +79,20 @@ def least(one: Together) -> float:
     return calibration.THRESHOLD + calibration.FITTED_MISFIT * one.gain
 
 
-def _without(case, both: Together, out) -> list[Together]:
-    kept, base = [r for r in both.refits if r is not out], case.base
+def _alone(case, both: Together, kept) -> list[Together]:
+    """One of two laws with the numbers and the base that it has beside the other; none where the engine breaks down."""
     try:
-        law = joined([law_of(r.finding.hypothesis, r.amplitude, case.clip) for r in kept])
-        moved = respond(case.clip, replace(base, x=both.x), law, case.memo)
+        moved = respond(
+            case.clip,
+            replace(case.base, x=both.x),
+            law_of(kept.finding.hypothesis, kept.amplitude, case.clip),
+            case.memo,
+        )
     except IMPOSSIBLE:
         return []
-    alone = prediction(case, kept, moved, both.x)
-    response = moved - base.simulated
-    mine = [replace(r, response=response, gain=alone.gain, x=both.x) for r in kept]
-    return [replace(alone, refits=mine)] if len(mine) == 1 else [alone]
+    found = prediction(case, [kept], moved, both.x)
+    mine = replace(kept, response=moved - case.base.simulated, gain=found.gain, x=both.x)
+    return [replace(found, refits=[mine])]
 
 
 def _freed(case, refits: list, say) -> list[Together]:

@@ -39,7 +39,7 @@ def test_a_thin_flap_may_be_pressed_on_from_both_sides():
     thin = Mesh(block().vertices * [1, 1, 0.15], block().faces)
     here = Place((0.0, 0.0, 0.0009), 0.003)
     assert outward(body(thin, boxes=False), here, np.array([0, 0, 1.0])) == pytest.approx(0.0, abs=0.05)
-    # Held from below it has one free side.
+    # Where a box holds all of it, nothing can press on it.
     assert outward(body(thin), here, np.array([0, 0, 1.0])) == 0.0
 
 
