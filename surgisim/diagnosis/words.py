@@ -42,7 +42,7 @@ def sentence(found: Sequence[tuple[Hypothesis, dict[str, dict], float]], gained:
 def _told(h: Hypothesis, parameters: dict[str, dict]) -> tuple[str, str]:
     """What a law makes tissue do, and what it is."""
     seen, law = SAYS[h.term]
-    where = "" if h.place is None else f"near ({', '.join(f'{1e3 * c:.0f}' for c in h.place.center)}) mm"
+    where = "" if h.place is None else _near(h.place.center)
     amount = ""
     if parameters:
         name, first = next(iter(parameters.items()))
@@ -64,9 +64,8 @@ def nothing(above: float) -> str:
 
 
 def unexplained(best: str, left: float, when: str, where: list[float]) -> str:
-    at = ", ".join(f"{1e3 * c:.0f}" for c in where)
     return (
-        f"The recording departs from its simulation, most of all near ({at}) mm {when}, and no law tried explains it: "
+        f"The recording departs from its simulation, most of all {_near(where)} {when}, and no law tried explains it: "
         f"{best} comes nearest and leaves {100 * left:.0f} % of it. "
         "What is missing is not in the catalogue, or more than one thing."
     )
@@ -74,12 +73,15 @@ def unexplained(best: str, left: float, when: str, where: list[float]) -> str:
 
 def drawn(h: Hypothesis) -> str:
     """h: a push that points out of the tissue."""
-    at = ", ".join(f"{1e3 * c:.0f}" for c in h.place.center)
     return (
-        f"Something unseen draws the tissue out of its surface near ({at}) mm from {_moment(h.onset)} to "
+        f"Something unseen draws the tissue out of its surface {_near(h.place.center)} from {_moment(h.onset)} to "
         f"{_moment(h.end)}; a contact could only press on it, and no law of the catalogue does that. "
         "A second grip or a stitch that was not recorded would; mark it as a grip and diagnose again."
     )
+
+
+def _near(where: Sequence[float]) -> str:
+    return f"near ({', '.join(f'{1e3 * c:.0f}' for c in where)}) mm"
 
 
 def _moment(seconds: float | None) -> str:
