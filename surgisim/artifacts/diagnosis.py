@@ -5,6 +5,8 @@ from typing import Any
 
 from surgisim.artifacts.base import JsonArtifact, check
 
+ALIKE = 1e-5
+"""Errors that differ by less are the same [mm]: positions of 5 cm have steps of 4e-6 mm in single precision."""
 VERDICTS = ("named", "equivalence class", "nothing detectable", "unexplained")
 
 

@@ -23,6 +23,7 @@ from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
 from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
 from surgisim.diagnosis.sharpen import finer
 from surgisim.diagnosis.together import Together, needed, together
+from surgisim.estimation.trial import at_once
 from surgisim.recordings.recording import Recording
 
 Progress = Callable[[float, float, str], None]
@@ -47,6 +48,11 @@ class Case:
     """(N, D)"""
     slopes: slice
     """Where the base's own columns stand in the metric."""
+
+    @property
+    def workers(self) -> int:
+        """Runs side by side."""
+        return self.settings.workers if self.clip.device == "cpu" else 1
 
 
 def diagnose(
@@ -79,16 +85,14 @@ def compete(case: Case, laws: dict, ranked: list[str], progress: Progress) -> tu
     best = laws[ranked[0]][2][0].gain
     waiting = [t for t in ranked if laws[t][2][0].gain > calibration.RIVAL * best][: settings.refine]
     while waiting:
-        term = waiting.pop(0)
-        progress(0.65 + 0.02 * len(refits), 1, f"the engine with {term}")
-        fine, evidence = sharpened(case, laws[term], case.z)
-        refits.append(refit(case, fine, evidence, case.z))
+        progress(0.65 + 0.02 * len(refits), 1, f"the engine with {', '.join(waiting)}")
+        fine = [sharpened(case, laws[term], case.z) for term in waiting]
+        refits += at_once(lambda one, _: refit(case, *one, case.z), fine, case.workers)
         known = {r.term for r in refits}
         top = max(r.log_evidence for r in refits)
-        rest = [t for t in ranked if t not in known and t not in waiting and laws[t][0] > top]
-        if not waiting and len(refits) < 2 * settings.refine:
-            # What the engine does not confirm gives way to what the tangent puts next.
-            waiting = rest[:1]
+        rest = [t for t in ranked if t not in known and laws[t][0] > top]
+        # What the engine does not confirm gives way to what the tangent puts next.
+        waiting = rest[:1] if len(refits) < 2 * settings.refine else []
     refits.sort(key=lambda r: -r.log_evidence)
     if from_rest(case, refits[0], case.z):
         case = replace(case, clip=replace(case.clip, shifted=False))

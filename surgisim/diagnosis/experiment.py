@@ -11,26 +11,36 @@ from surgisim.diagnosis.form import places
 from surgisim.diagnosis.hypothesis import ease
 from surgisim.diagnosis.laws import IMPOSSIBLE, Law, respond
 from surgisim.diagnosis.memo import Memo
+from surgisim.estimation.trial import at_once
 
 PULL, HOLD, REST = 0.6, 1.2, 0.8
 """How long a proposed pull takes, holds, and is watched after its release [s]."""
 
 
-def separating(clip: Clip, base: Base, first: Law, second: Law, memo: Memo, names: tuple[str, str], rng) -> str:
+def separating(
+    clip: Clip, base: Base, first: Law, second: Law, memo: Memo, names: tuple[str, str], rng, workers: int = 1
+) -> str:
     """The pull, of a few, under which the two laws differ most, in words."""
-    best = None
-    for text, motion in pulls(clip, rng):
-        trial = _instead(clip, motion)
+
+    def moved(run: tuple[Clip, Law], _worker: int) -> np.ndarray | None:
+        trial, law = run
         try:
-            seen = [respond(trial, base, replace(law, motion=None), memo) for law in (first, second)]
+            return respond(trial, base, replace(law, motion=None), memo)
         except IMPOSSIBLE:
-            continue
-        differ = float(np.sqrt(((seen[0] - seen[1]) ** 2).sum(-1).mean()))
-        if best is None or differ > best[0]:
-            best = (differ, text)
-    if best is None:
+            return None
+
+    tried = pulls(clip, rng)
+    trials = [_instead(clip, motion) for _, motion in tried]
+    seen = at_once(moved, [(trial, law) for trial in trials for law in (first, second)], workers)
+    differ = [
+        (float(np.sqrt(((one - other) ** 2).sum(-1).mean())), text)
+        for (text, _), one, other in zip(tried, seen[::2], seen[1::2], strict=True)
+        if one is not None and other is not None
+    ]
+    if not differ:
         return f"None of the pulls tried can be simulated with both {names[0]} and {names[1]}."
-    return f"{best[1]}: {names[0]} and {names[1]} would then differ by {1e3 * best[0]:.2g} mm RMS."
+    most, text = max(differ, key=lambda d: d[0])
+    return f"{text}: {names[0]} and {names[1]} would then differ by {1e3 * most:.2g} mm RMS."
 
 
 def _instead(clip: Clip, motion: Motion) -> Clip:

@@ -69,7 +69,6 @@ def refined(
     where the engine breaks down at the start.
     """
     clip, base, whiten, until = case.clip, case.base, case.whiten, case.clip.until
-    workers = case.settings.workers if clip.device == "cpu" else 1
     knobs = [_knobs(h, amplitude, clip) for h, amplitude in starts]
     own = sum(len(k) for k in knobs)
     name = " and ".join(h.term for h, _ in starts)
@@ -107,7 +106,7 @@ def refined(
         bases.append((base_at - base.x) / SPREAD)
     begins = [np.concatenate([np.zeros(own), by]) for by in bases]
     say(f"{name} with all numbers free")
-    residuals = at_once(left, begins, workers)
+    residuals = at_once(left, begins, case.workers)
     k = int(np.argmin([cost(x, r) for x, r in zip(begins, residuals, strict=True)]))
     x, r = begins[k], residuals[k]
     if r is None:
@@ -117,7 +116,7 @@ def refined(
     for n in range(ROUNDS):
         say(f"{name} with all numbers free, round {n + 1} of at most {ROUNDS}")
         if J is None:
-            sides = at_once(left, [x + STEP * e for e in np.eye(len(x))], workers)
+            sides = at_once(left, [x + STEP * e for e in np.eye(len(x))], case.workers)
             J = np.stack([np.zeros_like(r) if s is None else (r - s) / STEP for s in sides], 1)
             fresh += 1
         normal = space.gram(J, J) + np.eye(len(x))
@@ -126,7 +125,7 @@ def refined(
             np.clip(np.linalg.solve(normal + f * damping * np.diag(np.diag(normal)), pull), -1.5, 1.5)
             for f in (0.1, 3.0)
         ]
-        results = at_once(left, [x + s for s in steps], workers)
+        results = at_once(left, [x + s for s in steps], case.workers)
         for step, result in zip(steps, results, strict=True):
             if result is not None:
                 J = J + np.outer((r - result) - J @ step, step) / max(step @ step, 1e-12)

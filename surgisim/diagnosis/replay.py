@@ -13,6 +13,7 @@ from surgisim.diagnosis.base import carried, simulate
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.laws import IMPOSSIBLE, Clash, joined, law_of, respond
 from surgisim.diagnosis.together import Together
+from surgisim.estimation.trial import at_once
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,7 @@ def replayed(case, named: Together, placebo: Together | None) -> Replay | None:
     memo = replace(case.memo, about=f"{case.memo.about} {share}")
 
     def bare(x: np.ndarray) -> np.ndarray:
+        prepared = clip.prepared(case.base.prepared.terms)
         _, run = simulate(prepared, clip, x, memo, clip.frames)
         return carried(prepared.simulator.carry(clip.rest), run)
 
@@ -51,7 +53,11 @@ def replayed(case, named: Together, placebo: Together | None) -> Replay | None:
             return simulated + sum(respond(clip, base, law, memo) - simulated for law in laws)
 
     try:
-        prepared = clip.prepared(case.base.prepared.terms)
-        return Replay(clip, bare(case.base.x), moved(named), None if placebo is None else moved(placebo))
+        before, *after = at_once(
+            lambda what, _: bare(case.base.x) if what is None else moved(what),
+            [None, named, *([] if placebo is None else [placebo])],
+            case.workers,
+        )
     except IMPOSSIBLE:
         return None
+    return Replay(clip, before, after[0], after[1] if placebo is not None else None)

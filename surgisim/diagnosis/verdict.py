@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit
 
-from surgisim.artifacts.diagnosis import Diagnosis
+from surgisim.artifacts.diagnosis import ALIKE, Diagnosis
 from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.diagnosis import calibration, words
@@ -49,8 +49,11 @@ class Judgement:
         return self.verdict in ("named", "equivalence class")
 
 
-def judged(case, laws, refits, fitted: Together, bend) -> Judgement:
-    """Where something is detected. refits: best first; fitted: what may be named of them, and what else."""
+def judged(case, laws, refits, fitted: Together, bend, over_placebo: float | None = None) -> Judgement:
+    """Where something is detected. refits: best first; fitted: what may be named of them, and what else.
+
+    over_placebo: held-out error of a placebo less that of what is named [mm]; None where there is none.
+    """
     chances, first = probabilities(laws, refits, True), refits[0]
     total = max(explainable(bend), *(r.gain for r in refits), 1e-9)
     accepted, after = fitted.refits, fitted.moved
@@ -64,6 +67,7 @@ def judged(case, laws, refits, fitted: Together, bend) -> Judgement:
         "gain": fitted.gain,
         "predicted": predicted(case, after, noise.sigma),
         "outward": max((out for out, _ in pushes(case.clip.recording, accepted)), default=None),
+        "over_placebo": over_placebo,
     }
     explained = max(shares["gained"], shares["taken"])
     verdict = "named"
@@ -100,14 +104,15 @@ def write(
         plain = base.simulated
         nothing = probabilities(laws, refits, False)
         said_of = Judgement("nothing detectable", [], nothing, [], 0.0, plain, noise_beside(case, plain), {})
-    verdict, effects, chances, named = said_of.verdict, said_of.effects, said_of.chances, said_of.named
-    after, noise, explained = said_of.after, said_of.noise, said_of.explained
-    if named:
+    shown = Replay(clip, base.simulated, said_of.after, None)
+    if said_of.named:
         say("a placebo, and what is named on a finer grid")
-    wrong = placebo(case, fitted, refits, laws) if named else None
-    # What is shown is replayed on a finer grid, where the engine bears it.
-    fine = replayed(case, fitted, wrong) if named else None
-    shown = fine or Replay(clip, base.simulated, after, None if wrong is None else wrong.moved)
+        shown = beside_placebo(case, fitted, placebo(case, fitted, refits, laws))
+        said_of = judged(case, laws, refits, fitted, bend, over_placebo(case, shown))
+        if not said_of.named:
+            shown = replace(shown, after=shown.before, placebo=None)
+    verdict, effects, chances, named = said_of.verdict, said_of.effects, said_of.chances, said_of.named
+    noise, explained = said_of.noise, said_of.explained
     fit, held_out = errors(case, shown.before, shown.after, shown.placebo, noise.sigma)
     say("verdict")
     z, reach = symptom(clip, noise, residual(case, base.simulated, False, rest_only=False), rng)
@@ -120,7 +125,7 @@ def write(
     if named and case.settings.experiment and len(refits) > 1:
         pair = [law_of(r.finding.hypothesis, r.amplitude, clip) for r in refits[:2]]
         effects[0]["separating_experiment"] = separating(
-            clip, base, *pair, case.memo, (refits[0].term, refits[1].term), rng
+            clip, base, *pair, case.memo, (refits[0].term, refits[1].term), rng, case.workers
         )
     said = _words(case, said_of, refits, laws, z)
     above = detectable(case, laws)
@@ -161,6 +166,20 @@ def write(
     return diagnosis, physics(replace(case, clip=shown.clip), said_of.accepted if named else []), mismatch
 
 
+def beside_placebo(case, fitted: Together, wrong: Together | None) -> Replay:
+    """What is shown of what is named: on a finer grid, where the engine bears it."""
+    as_searched = Replay(case.clip, case.base.simulated, fitted.moved, None if wrong is None else wrong.moved)
+    return replayed(case, fitted, wrong) or as_searched
+
+
+def over_placebo(case, shown: Replay) -> float | None:
+    """Held-out error of the placebo less that of what is named [mm]; None where one is missing."""
+    if shown.placebo is None:
+        return None
+    named, wrong = (rms(case, moved)[1] for moved in (shown.after, shown.placebo))
+    return None if named is None else wrong - named
+
+
 def noise_beside(case, after: np.ndarray) -> Noise:
     """The noise with an effect taken off: then quiet frames show it alone."""
     clip, quiet = case.clip, slice(0, case.clip.until)
@@ -194,9 +213,9 @@ def doubtful(term: str, shares: dict[str, float | None]) -> bool:
 
     A push of free place, direction and course follows whatever comes and goes: only where it leaves next to nothing is
     it one, and only where it presses on a surface; what draws tissue outward holds it. And no law is believed that
-    leaves a large misfit on other frames as it was.
+    leaves a large misfit on other frames as it was, or that a placebo beats there.
     """
-    if draws(shares):
+    if draws(shares) or beaten(shares):
         return True
     if term == "hidden_contact" and shares["left"] > calibration.PUSH_LEAVES:
         return True
@@ -206,6 +225,11 @@ def doubtful(term: str, shares: dict[str, float | None]) -> bool:
 def draws(shares: dict[str, float | None]) -> bool:
     """Whether an unseen push that would be named draws tissue out of its surface, as no contact can."""
     return shares["outward"] is not None and shares["outward"] > calibration.PULLS
+
+
+def beaten(shares: dict[str, float | None]) -> bool:
+    """Whether a placebo foretells the frames held out better, by however little that can be told."""
+    return shares["over_placebo"] is not None and shares["over_placebo"] < -ALIKE
 
 
 def pushes(recording, accepted: list) -> list[tuple[float, Hypothesis]]:
@@ -345,9 +369,13 @@ def _words(case, said_of: Judgement, refits, laws, z) -> str:
     if verdict == "unexplained" and draws(said_of.shares) and said_of.shares["left"] <= calibration.PUSH_LEAVES:
         return words.drawn(max(pushes(case.clip.recording, said_of.accepted), key=lambda push: push[0])[1])
     if verdict == "unexplained":
+        best = refits[0].term
         k, t = np.unravel_index(np.argmax(z[:, : case.clip.until]), (len(z), case.clip.until))
         when = f"at {t / case.clip.fps:.2g} s ({PHASES[case.clip.phases()[t]]})"
-        return words.unexplained(refits[0].term, 1 - explained, when, case.clip.rest[k].tolist())
+        where = case.clip.rest[k].tolist()
+        if beaten(said_of.shares):
+            return words.beaten(best, 1e3 * said_of.shares["over_placebo"], when, where)
+        return words.unexplained(best, 1 - explained, when, where)
     found = zip(said_of.accepted, said_of.effects, strict=True)
     said = words.sentence([(r.finding.hypothesis, e["parameters"], r.finding.size) for r, e in found], explained)
     if verdict == "equivalence class":

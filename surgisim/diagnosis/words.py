@@ -71,6 +71,14 @@ def unexplained(best: str, left: float, when: str, where: list[float]) -> str:
     )
 
 
+def beaten(best: str, by: float, when: str, where: list[float]) -> str:
+    """by: what a placebo's held-out error is above that of the best law [um], less than nothing."""
+    return (
+        f"The recording departs from its simulation, most of all {_near(where)} {when}, and {best} comes nearest. "
+        f"It is not named, because a placebo foretells the manipulation held out better, by {-by:.2g} um RMS."
+    )
+
+
 def drawn(h: Hypothesis) -> str:
     """h: a push that points out of the tissue."""
     return (

@@ -17,14 +17,13 @@ The oracle is another solver than the one that diagnoses, so that `share` also c
 
 import numpy as np
 
+from surgisim.artifacts.diagnosis import ALIKE
 from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.verdict import Verdict
 from surgisim.problem import Problem
 from surgisim.proof.truth import Truth
 from surgisim.recordings.recording import Recording
 
-ALIKE = 1e-5
-"""Errors that differ by less are the same [mm]: positions of 5 cm have steps of 4e-6 mm in single precision."""
 LEAST = 3
 """Frames of rest that an offset is told from; where a point is seen in fewer, from all frames that may be fitted."""
 

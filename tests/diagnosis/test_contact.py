@@ -64,4 +64,5 @@ def test_what_draws_tissue_outward_is_not_called_a_contact():
     ("outwards", "left", "doubted"), [(-0.8, 0.05, False), (0.5, 0.05, True), (None, 0.05, False), (-0.8, 0.4, True)]
 )
 def test_a_push_is_doubted_where_it_draws_or_leaves_much(outwards, left, doubted):
-    assert doubtful("hidden_contact", {"outward": outwards, "left": left, "predicted": None}) == doubted
+    shares = {"outward": outwards, "left": left, "predicted": None, "over_placebo": None}
+    assert doubtful("hidden_contact", shares) == doubted

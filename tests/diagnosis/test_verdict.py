@@ -5,6 +5,7 @@ import pytest
 from planted import GRID, recording
 
 from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis import verdict as judging
 from surgisim.diagnosis.calibration import THRESHOLD
 from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.diagnose import diagnose, prepare_case, refit
@@ -16,13 +17,21 @@ from surgisim.physics.place import Place
 SETTINGS = Diagnosing(grid=GRID, nulls=8, experiment=False, free=0)
 
 
-def verdict(**planted):
-    return diagnose(recording(**planted), SETTINGS, lambda *_: None, Memo(None, ""))
+TILT = {"gravity": {"x": 8.0, "y": 0.0, "z": 0.0, "onset": -1.0}}
+
+
+def verdict(memory=None, **planted):
+    return diagnose(recording(**planted), SETTINGS, lambda *_: None, Memo(memory, ""))
 
 
 @pytest.fixture(scope="module")
-def tilted():
-    return verdict(values={"gravity": {"x": 8.0, "y": 0.0, "z": 0.0, "onset": -1.0}})
+def memory(tmp_path_factory):
+    return tmp_path_factory.mktemp("runs")
+
+
+@pytest.fixture(scope="module")
+def tilted(memory):
+    return verdict(memory, values=TILT)
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +49,23 @@ def test_a_change_of_weight_is_named(tilted):
     assert physics.terms["gravity"]["x"]["value"] == pytest.approx(x["value"])
     assert found.fit["after"] < found.fit["before"]
     assert found.fit["after"] < found.fit["placebo"]
+
+
+def test_a_law_that_its_placebo_beats_on_held_out_frames_is_neither_named_nor_modelled(tilted, memory, monkeypatch):
+    monkeypatch.setattr(judging, "over_placebo", lambda case, shown: -1e-3)
+    found, physics, _ = verdict(memory, values=TILT)
+    assert found.verdict == "unexplained"
+    assert found.effects[0]["probability"] < 0.5
+    assert "gravity" not in physics.terms
+    assert found.fit["after"] == found.fit["before"]
+    assert "a placebo foretells the manipulation held out better" in found.words
+
+
+def test_a_tie_with_a_placebo_is_no_defeat():
+    shares = {"outward": None, "left": 0.0, "predicted": None}
+    assert not judging.doubtful("gravity", {**shares, "over_placebo": None})
+    assert not judging.doubtful("gravity", {**shares, "over_placebo": -0.9e-5})
+    assert judging.doubtful("gravity", {**shares, "over_placebo": -1.1e-5})
 
 
 def test_nothing_planted_is_nothing_named(plain):

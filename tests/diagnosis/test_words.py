@@ -3,7 +3,7 @@
 import numpy as np
 
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.words import sentence
+from surgisim.diagnosis.words import beaten, sentence
 from surgisim.physics.place import Place
 
 PUSH = Hypothesis("hidden_contact", np.eye(3), 0, Place((-0.022, -0.007, 0.003), 0.003), 0.48, 1.2)
@@ -35,3 +35,9 @@ def test_a_number_without_a_unit_is_said_without_one():
 def test_a_load_is_said_in_grams():
     load = Hypothesis("added_mass", np.eye(1), 1, Place((0.0, 0.0, 0.0), 0.003), 0.6)
     assert "a weight there (mass = 8.6 g, 6.88 to 10.3)" in sentence([(load, of("mass", 8.6e-3, "kg"), 6e-4)], 1.0)
+
+
+def test_a_law_that_a_placebo_beats_is_said_not_to_be_named():
+    said = beaten("stiff_inclusion", -0.02, "at 0.8 s (hold)", [0.01, 0.0, 0.002])
+    assert "near (10, 0, 2) mm at 0.8 s (hold), and stiff_inclusion comes nearest. " in said
+    assert said.endswith("a placebo foretells the manipulation held out better, by 0.02 um RMS.")
