@@ -215,16 +215,18 @@ def doubtful(term: str, shares: dict[str, float | None]) -> bool:
     it one, and only where it presses on a surface; what draws tissue outward holds it. And no law is believed that
     leaves a large misfit on other frames as it was, or that a placebo beats there.
     """
-    if draws(shares) or beaten(shares):
-        return True
-    if term == "hidden_contact" and shares["left"] > calibration.PUSH_LEAVES:
-        return True
-    return shares["predicted"] is not None and shares["predicted"] < calibration.PREDICTED
+    loose = term == "hidden_contact" and shares["left"] > calibration.PUSH_LEAVES
+    return loose or draws(shares) or beaten(shares) or idle(shares)
 
 
 def draws(shares: dict[str, float | None]) -> bool:
     """Whether an unseen push that would be named draws tissue out of its surface, as no contact can."""
     return shares["outward"] is not None and shares["outward"] > calibration.PULLS
+
+
+def idle(shares: dict[str, float | None]) -> bool:
+    """Whether a large misfit on the frames held out stays as it was."""
+    return shares["predicted"] is not None and shares["predicted"] < calibration.PREDICTED
 
 
 def beaten(shares: dict[str, float | None]) -> bool:
@@ -375,6 +377,8 @@ def _words(case, said_of: Judgement, refits, laws, z) -> str:
         where = case.clip.rest[k].tolist()
         if beaten(said_of.shares):
             return words.beaten(best, 1e3 * said_of.shares["over_placebo"], when, where)
+        if idle(said_of.shares):
+            return words.idle(best, when, where)
         return words.unexplained(best, 1 - explained, when, where)
     found = zip(said_of.accepted, said_of.effects, strict=True)
     said = words.sentence([(r.finding.hypothesis, e["parameters"], r.finding.size) for r, e in found], explained)

@@ -73,9 +73,19 @@ def unexplained(best: str, left: float, when: str, where: list[float]) -> str:
 
 def beaten(best: str, by: float, when: str, where: list[float]) -> str:
     """by: what a placebo's held-out error is above that of the best law [um], less than nothing."""
+    return _unbelieved(best, when, where, f"a placebo foretells the manipulation held out better, by {-by:.2g} um RMS")
+
+
+def idle(best: str, when: str, where: list[float]) -> str:
+    """For a law that fits and foretells nothing."""
+    why = "it leaves the manipulation held out nearly as far off as it was"
+    return _unbelieved(best, when, where, f"{why}: what is missing is another thing, or more than one")
+
+
+def _unbelieved(best: str, when: str, where: list[float], why: str) -> str:
     return (
         f"The recording departs from its simulation, most of all {_near(where)} {when}, and {best} comes nearest. "
-        f"It is not named, because a placebo foretells the manipulation held out better, by {-by:.2g} um RMS."
+        f"It is not named, because {why}."
     )
 
 

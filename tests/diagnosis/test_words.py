@@ -3,7 +3,7 @@
 import numpy as np
 
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.words import beaten, sentence
+from surgisim.diagnosis.words import beaten, idle, sentence
 from surgisim.physics.place import Place
 
 PUSH = Hypothesis("hidden_contact", np.eye(3), 0, Place((-0.022, -0.007, 0.003), 0.003), 0.48, 1.2)
@@ -41,3 +41,9 @@ def test_a_law_that_a_placebo_beats_is_said_not_to_be_named():
     said = beaten("stiff_inclusion", -0.02, "at 0.8 s (hold)", [0.01, 0.0, 0.002])
     assert "near (10, 0, 2) mm at 0.8 s (hold), and stiff_inclusion comes nearest. " in said
     assert said.endswith("a placebo foretells the manipulation held out better, by 0.02 um RMS.")
+
+
+def test_a_law_that_foretells_nothing_is_said_not_to_be_named():
+    said = idle("tool_slip", "at 3.6 s (release)", [0.013, -0.027, 0.003])
+    assert "at 3.6 s (release), and tool_slip comes nearest. It is not named, because it leaves" in said
+    assert said.count(". ") == 1
