@@ -7,13 +7,11 @@ import numpy as np
 import warp as wp
 
 from surgisim.mpm.grid import same_nodes
-from surgisim.mpm.kernels import law_functions, node_kernels, shapes
+from surgisim.mpm.kernels import ABREAST, law_functions, node_kernels, shapes
 from surgisim.mpm.march import Phases
 
-ABREAST = 4
-"""Links that a thread fetches at once, rather than wait for one after the other; rows hold a multiple of it."""
-
-
+PIECE = 32
+"""Sums of cells that a thread adds up for a node; functions of a grip hang on hundreds, which several threads share."""
 BLOCK = 64
 """Particles that are stepped in one block: few, so that no multiprocessor waits for the last one."""
 
@@ -21,8 +19,8 @@ BLOCK = 64
 class ByParticle:
     """A body's particles, sorted by the nodes they hang on, and the sums from them to the nodes."""
 
-    parts, ticks = 1, True
-    """One sum for each node; the clock moves on while particles are lumped."""
+    ticks = True
+    """The clock moves on while particles are lumped."""
 
     def __init__(self, local: np.ndarray, links: np.ndarray, count: int, terms, precision: str, threads: int, put):
         """local (P, K) and links (P, K, 4): nodes, of which there are `count`; put(array, dtype) -> device array."""
@@ -39,11 +37,18 @@ class ByParticle:
         ]
         # Rows of odd length: at powers of two the sums of neighbouring cells push each other out of the cache.
         self.shape, self.stride = nodes.shape, nodes.shape[1] | 1
-        at = (np.arange(len(nodes))[:, None] * self.stride + np.arange(nodes.shape[1])).ravel()
-        entry = np.argsort(nodes.ravel(), kind="stable")
         self.begin = put(np.searchsorted(np.sort(cell), np.arange(len(nodes) + 1)), int)
-        self.start = put(np.searchsorted(nodes.ravel()[entry], np.arange(count + 1)), int)
-        self.entry = put(at[entry], int)
+        used = np.zeros(nodes.shape, bool)
+        np.logical_or.at(used, cell, links.any(-1))
+        at = np.arange(len(nodes))[:, None] * self.stride + np.arange(nodes.shape[1])
+        start, entry, node, part = _pieces(nodes[used], at[used], filler=self.sums)
+        self.parts = int(part.max()) + 1
+        self.pieces = [put(a, int) for a in (start, entry, node, part)]
+
+    @property
+    def sums(self) -> int:
+        """Sums of the cells; one more stays zero."""
+        return self.shape[0] * self.stride
 
     def forward(self, clock, inputs: list, force, trouble) -> Phases:
         """From a state to the forces on the nodes; inputs as in the kernels."""
@@ -69,12 +74,12 @@ class ByParticle:
     def _gathered(self, clock, way: str, per_particle: list, at_nodes: list) -> Phases:
         """Sums over the particles of every node, in two phases."""
         launch = {"device": clock.device, "record_cmd": True}
-        sums = [wp.zeros(self.shape[0] * self.stride, dtype=self.types.Vec, device=clock.device) for _ in at_nodes]
+        sums = [wp.zeros(self.sums + 1, dtype=self.types.Vec, device=clock.device) for _ in at_nodes]
         lump, gather = (getattr(self.node_kernels, f"{name}{way}") for name in ("lump", "gather"))
         lumped = [clock, self.begin, self.rows, *per_particle, self.stride, *sums]
         return [
             [wp.launch(lump, self.shape, lumped, **launch)],
-            [wp.launch(gather, len(self.start) - 1, [self.start, self.entry, *sums, *at_nodes], **launch)],
+            [wp.launch(gather, len(self.pieces[-1]), [*self.pieces, *sums, *at_nodes], **launch)],
         ]
 
 
@@ -82,6 +87,22 @@ def _padded(rows: np.ndarray) -> np.ndarray:
     """Rows (P, K, ...) made longer to a multiple of ABREAST, by their first node with links of weight zero."""
     filler = rows[:, :1] if rows.ndim == 2 else np.zeros_like(rows[:, :1])
     return np.concatenate([rows, np.repeat(filler, -rows.shape[1] % ABREAST, 1)], 1)
+
+
+def _pieces(node: np.ndarray, at: np.ndarray, filler: int) -> tuple[np.ndarray, ...]:
+    """Every `at` of a `node`, in pieces of at most PIECE: where each of N pieces starts, (N + 1,), and what all hold.
+
+    Also whose it is and which of that node's, (N,) each. Pieces hold a multiple of ABREAST, with `filler` at their end.
+    """
+    order = np.argsort(node, kind="stable")
+    held = np.bincount(node)
+    rank = np.arange(len(node)) - np.repeat(np.cumsum(held) - held, held)
+    begins = np.flatnonzero(rank % PIECE == 0)
+    length = np.diff(np.append(begins, len(node)))
+    start = np.concatenate([[0], np.cumsum(-(-length // ABREAST) * ABREAST)])
+    entry = np.full(start[-1], filler)
+    entry[np.repeat(start[:-1] - begins, length) + np.arange(len(node))] = at[order]
+    return start, entry, node[order][begins], rank[begins] // PIECE
 
 
 @cache

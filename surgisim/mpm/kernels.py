@@ -10,8 +10,9 @@ not on whole nodes, which would widen it by up to a cell.
 
 On a GPU both passes only gather, in a fixed order, so results do not depend on the number of threads: particles that
 hang on the same nodes (those of one cell) are lumped first, one sum for each of their nodes, and every node sums over
-its lumps. On a CPU, where a launch is one thread, particles add straight into the nodes instead: as repeatable, and
-without storing a stress; each of several threads has a share of the particles and its own part of the sums.
+its lumps, in several parts where it has hundreds, as the functions of a grip do. On a CPU, where a launch is one
+thread, particles add straight into the nodes instead: as repeatable, and without storing a stress; each of several
+threads has a share of the particles and its own part of the sums.
 
 The clock moves on where nobody reads it: in a kernel of its own on a CPU, while particles are lumped on a GPU.
 
@@ -25,6 +26,9 @@ from types import SimpleNamespace
 import warp as wp
 
 from surgisim.physics.fold import REAL, folded
+
+ABREAST = 4
+"""Numbers that a thread fetches at once, rather than wait for one after the other; rows hold a multiple of it."""
 
 
 @cache
@@ -85,14 +89,18 @@ def node_kernels(precision: str) -> SimpleNamespace:
     def gather(
         start: wp.array(dtype=int),
         entry: wp.array(dtype=int),
+        node: wp.array(dtype=int),
+        part: wp.array(dtype=int),
         lumped: wp.array(dtype=Vec),
         force: wp.array2d(dtype=Vec),
     ):
-        i = wp.tid()
+        n = wp.tid()
+        first = start[n]
         total = Vec()
-        for e in range(start[i], start[i + 1]):
-            total += lumped[entry[e]]
-        force[0, i] = total
+        for block in range((start[n + 1] - first) / wp.static(ABREAST)):
+            for j in range(wp.static(ABREAST)):
+                total += lumped[entry[first + block * wp.static(ABREAST) + j]]
+        force[part[n], node[n]] = total
 
     @wp.kernel(module="unique", enable_backward=False)
     def step(
@@ -182,19 +190,24 @@ def node_kernels(precision: str) -> SimpleNamespace:
     def gather_back(
         start: wp.array(dtype=int),
         entry: wp.array(dtype=int),
+        node: wp.array(dtype=int),
+        part: wp.array(dtype=int),
         lumped_u: wp.array(dtype=Vec),
         lumped_v: wp.array(dtype=Vec),
         u_bar: wp.array2d(dtype=Vec),
         v_bar: wp.array2d(dtype=Vec),
     ):
-        i = wp.tid()
+        n = wp.tid()
+        first = start[n]
         du = Vec()
         dv = Vec()
-        for e in range(start[i], start[i + 1]):
-            du += lumped_u[entry[e]]
-            dv += lumped_v[entry[e]]
-        u_bar[0, i] = u_bar[0, i] + du
-        v_bar[0, i] = v_bar[0, i] + dv
+        for block in range((start[n + 1] - first) / wp.static(ABREAST)):
+            for j in range(wp.static(ABREAST)):
+                e = entry[first + block * wp.static(ABREAST) + j]
+                du += lumped_u[e]
+                dv += lumped_v[e]
+        u_bar[part[n], node[n]] = u_bar[part[n], node[n]] + du
+        v_bar[part[n], node[n]] = v_bar[part[n], node[n]] + dv
 
     return SimpleNamespace(
         lump=lump, gather=gather, step=step, before=before, lump_back=lump_back, gather_back=gather_back

@@ -60,7 +60,7 @@ class Kinks:
             value = value - np.einsum("qk,qkm->qm", link[near, :, 0], mine)
             slope = slope - np.einsum("qkd,qkm->qmd", link[near, :, 1:], mine)
             while len(blocks) <= (used[near].max() if len(near) else -1):
-                blocks.append((np.zeros((len(points), FUNCTIONS), np.int32), np.zeros((len(points), FUNCTIONS, 4))))
+                blocks.append((np.repeat(index[:, :1], FUNCTIONS, 1), np.zeros((len(points), FUNCTIONS, 4))))
             for slot, (nodes, links) in enumerate(blocks):
                 here = used[near] == slot
                 nodes[near[here]] = self.first + FUNCTIONS * b + np.arange(FUNCTIONS)

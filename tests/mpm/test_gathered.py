@@ -1,5 +1,7 @@
 """The GPU's way to step and to sum, run on the CPU against the CPU's own way."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from slab import pulled, slab
@@ -31,3 +33,18 @@ def test_particle_by_particle_moves_the_body_as_cell_by_cell_does_and_gives_the_
     monkeypatch.setattr(simulator, "by_cell", lambda device: False)
     for ours, theirs in zip(one(), added, strict=True):
         assert np.linalg.norm(ours - theirs) < 1e-10 * np.linalg.norm(theirs)
+
+
+def test_a_node_gathers_only_what_weighs_something(monkeypatch):
+    monkeypatch.setattr(simulator, "by_cell", lambda device: False)
+    motion = pulled()
+    two = dataclasses.replace(
+        motion, **{k: np.concatenate([v, v]) for k, v in vars(motion).items() if isinstance(v, np.ndarray)}
+    )
+    gathered = {}
+    for name, grips in (("none", None), ("two", two)):
+        made = prepare(slab(), tuple(VALUES), density=1050.0, grips=grips).simulator
+        start, _, node, _ = (a.numpy() for a in made.layout.pieces)
+        gathered[name] = np.bincount(node, np.diff(start))[: made.rule.shape[1]]
+    # A grip parts the particles of a cell, those it reaches from those it does not, and no more.
+    assert gathered["two"].max() <= 2 * gathered["none"].max()
