@@ -57,10 +57,14 @@ def block(particles: int, grid: int, frames: int = 2, seed: int = 0) -> tuple[Bo
     return body, Motion(center, np.array([2 * spacing]), path[None], np.ones((1, frames), bool), np.ones(1), "given")
 
 
-def measure(device: str, particles: int, grid: int, bursts: int, threads: int) -> dict:
-    """Microseconds per step, forward and adjoint (its recomputation not counted), and memory [MB]."""
+def measure(device: str, particles: int, grid: int, bursts: int, threads: int, bend: bool) -> dict:
+    """Microseconds per step, forward and adjoint (its recomputation not counted), and memory [MB].
+
+    bend: whether the displacement may bend at the skin of the grip (kink.py).
+    """
     body, motion = block(particles, grid, FRAMES[device])
-    made = prepare(body, tuple(VALUES), density=1050.0, device=device, threads=threads)
+    grips = motion if bend else None
+    made = prepare(body, tuple(VALUES), density=1050.0, device=device, threads=threads, grips=grips)
     step = 1 / made.per_frame(VALUES, fps=1.0)
     path = made.drive(motion, VALUES, fps=1 / (STEPS * step), per_frame=STEPS)
     theta, steps = made.theta(VALUES), path.steps
@@ -72,13 +76,14 @@ def measure(device: str, particles: int, grid: int, bursts: int, threads: int) -
     back()
     forward = min(_seconds(lambda: made.simulator.run(theta, path), device) for _ in range(bursts))
     both = min(_seconds(back, device) for _ in range(bursts))
-    plain = {} if wp.get_device(device).is_cuda else _plain(made, theta, path, bursts, forward)
+    plain = {} if wp.get_device(device).is_cuda or bend else _plain(made, theta, path, bursts, forward)
     return {
         "device": _name(device),
         "threads": threads,
         "particles": len(body.rest),
         "grid": grid,
         "nodes": len(made.simulator.place),
+        "kinks": made.simulator.kinks.count,
         "steps_timed": steps,
         "forward_us": round(1e6 * forward / steps, 1),
         **plain,
@@ -122,11 +127,14 @@ def main() -> None:
     cli.add_argument("--grid", type=int, default=50, help="cells along the longest side")
     cli.add_argument("--threads", type=int, nargs="+", default=[1, 2], help="on a CPU")
     cli.add_argument("--bursts", type=int, default=3)
+    cli.add_argument("--bend", action="store_true", help="at the skin of the grip, as in a diagnosis")
     cli.add_argument("--json", action="store_true", help="print JSON and not a line a row")
     arguments = cli.parse_args()
     threads = arguments.threads if arguments.device == "cpu" else [1]
     rows = [
-        measure(arguments.device, n, arguments.grid, arguments.bursts, t) for n in arguments.particles for t in threads
+        measure(arguments.device, n, arguments.grid, arguments.bursts, t, arguments.bend)
+        for n in arguments.particles
+        for t in threads
     ]
     if arguments.json:
         print(json.dumps(rows, indent=1))

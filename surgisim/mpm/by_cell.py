@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import warp as wp
 
-from surgisim.mpm.grid import same_nodes
+from surgisim.mpm.grid import cells_of
 from surgisim.mpm.kernels import law_functions, shapes
 from surgisim.mpm.march import Phases
 
@@ -30,7 +30,7 @@ class ByCell:
         """local (P, K) and links (P, K, 4): nodes, of which there are `count`; put(array, dtype) -> device array."""
         self.kernels = cell_kernels(terms, precision)
         self.laws, self.order = self.kernels.laws, np.arange(len(local))
-        nodes, cell = same_nodes(local)
+        nodes, cell, width, links = cells_of(local, links)
         sort = np.argsort(cell, kind="stable")
         place = np.arange(len(cell)) - np.searchsorted(cell[sort], cell[sort])
         # A crowded cell is several: (cell, round) pairs in order.
@@ -42,6 +42,7 @@ class ByCell:
         owner[row] = cell[sort]
         wide = np.where((member >= 0)[:, :, None, None], links[member], 0)
         self.links = [put(nodes[owner], int), put(wide.transpose(0, 2, 3, 1), lanes(precision).Row), put(member, int)]
+        self.links.append(put(width[owner], int))
         ends = np.linspace(0, len(kept), threads + 1).astype(int)
         self.shares = [(int(a), int(b - a)) for a, b in pairwise(ends)]
         self.parts = len(self.shares)
@@ -73,8 +74,8 @@ def lanes(precision: str) -> SimpleNamespace:
 def cell_kernels(names: tuple[str, ...], precision: str = "single") -> SimpleNamespace:
     """`step` and `adjoint` over cells, compiled for these laws.
 
-    nodes (C, K) of each cell; link (C, K, 4): weight and gradient of every particle in it; member (C, LANES): which
-    particles those are, -1 where a lane is empty.
+    nodes (C, K) of each cell, of which the first width (C,) count; link (C, K, 4): weight and gradient of every
+    particle in it; member (C, LANES): which particles those are, -1 where a lane is empty.
     """
     functions, s, wide = law_functions(names, precision), shapes(precision), lanes(precision)
     laws, answer, answer_back = functions.laws, functions.answer, functions.answer_back
@@ -86,10 +87,15 @@ def cell_kernels(names: tuple[str, ...], precision: str = "single") -> SimpleNam
 
     @wp.func
     def carried(
-        field: wp.array2d(dtype=Vec), nodes: wp.array2d(dtype=int), link: wp.array3d(dtype=Row), slot: int, c: int
+        field: wp.array2d(dtype=Vec),
+        nodes: wp.array2d(dtype=int),
+        link: wp.array3d(dtype=Row),
+        width: int,
+        slot: int,
+        c: int,
     ):
         total = Rows()
-        for k in range(nodes.shape[1]):
+        for k in range(width):
             total += wp.outer(field[slot, nodes[c, k]], link[c, k, 0])
         return total
 
@@ -107,6 +113,7 @@ def cell_kernels(names: tuple[str, ...], precision: str = "single") -> SimpleNam
         nodes: wp.array2d(dtype=int),
         link: wp.array3d(dtype=Row),
         member: wp.array2d(dtype=int),
+        width: wp.array(dtype=int),
         volume: wp.array(dtype=real),
         rho: wp.array(dtype=real),
         rest: wp.array(dtype=Vec),
@@ -127,7 +134,7 @@ def cell_kernels(names: tuple[str, ...], precision: str = "single") -> SimpleNam
         slot = clock[0] % slots
         Fx, Fy, Fz = Rows(), Rows(), Rows()
         Gx, Gy, Gz = Rows(), Rows(), Rows()
-        for k in range(nodes.shape[1]):
+        for k in range(width[c]):
             i = nodes[c, k]
             Fx += wp.outer(u[slot, i], link[c, k, 1])
             Fy += wp.outer(u[slot, i], link[c, k, 2])
@@ -138,10 +145,10 @@ def cell_kernels(names: tuple[str, ...], precision: str = "single") -> SimpleNam
         X, Y = Rows(), Rows()
         held = gripped(anchors, member, c)
         if wp.static(laws.forces):
-            X = carried(u, nodes, link, slot, c)
-            Y = carried(v, nodes, link, slot, c)
+            X = carried(u, nodes, link, width[c], slot, c)
+            Y = carried(v, nodes, link, width[c], slot, c)
         elif held > 0:
-            X = carried(u, nodes, link, slot, c)
+            X = carried(u, nodes, link, width[c], slot, c)
         Px, Py, Pz, B = Rows(), Rows(), Rows(), Rows()
         for j in range(member.shape[1]):
             p = member[c, j]
@@ -160,7 +167,7 @@ def cell_kernels(names: tuple[str, ...], precision: str = "single") -> SimpleNam
         loaded = held > 0
         if wp.static(laws.forces):
             loaded = True
-        for k in range(nodes.shape[1]):
+        for k in range(width[c]):
             load = -(Px * link[c, k, 1] + Py * link[c, k, 2] + Pz * link[c, k, 3])
             if loaded:
                 load += B * link[c, k, 0]
@@ -172,6 +179,7 @@ def cell_kernels(names: tuple[str, ...], precision: str = "single") -> SimpleNam
         nodes: wp.array2d(dtype=int),
         link: wp.array3d(dtype=Row),
         member: wp.array2d(dtype=int),
+        width: wp.array(dtype=int),
         volume: wp.array(dtype=real),
         rho: wp.array(dtype=real),
         rest: wp.array(dtype=Vec),
@@ -200,7 +208,7 @@ def cell_kernels(names: tuple[str, ...], precision: str = "single") -> SimpleNam
         Fx, Fy, Fz = Rows(), Rows(), Rows()
         Gx, Gy, Gz = Rows(), Rows(), Rows()
         Ax, Ay, Az, B = Rows(), Rows(), Rows(), Rows()
-        for k in range(nodes.shape[1]):
+        for k in range(width[c]):
             i = nodes[c, k]
             Fx += wp.outer(u[slot, i], link[c, k, 1])
             Fy += wp.outer(u[slot, i], link[c, k, 2])
@@ -215,10 +223,10 @@ def cell_kernels(names: tuple[str, ...], precision: str = "single") -> SimpleNam
         X, Y = Rows(), Rows()
         held = gripped(anchors, member, c)
         if wp.static(laws.forces):
-            X = carried(u, nodes, link, slot, c)
-            Y = carried(v, nodes, link, slot, c)
+            X = carried(u, nodes, link, width[c], slot, c)
+            Y = carried(v, nodes, link, width[c], slot, c)
         elif held > 0 and stiffness_bar.shape[1] > 0:
-            X = carried(u, nodes, link, slot, c)
+            X = carried(u, nodes, link, width[c], slot, c)
         dX, dY = Rows(), Rows()
         for j in range(member.shape[1]):
             p = member[c, j]
@@ -242,7 +250,7 @@ def cell_kernels(names: tuple[str, ...], precision: str = "single") -> SimpleNam
         loaded = held > 0
         if wp.static(laws.forces):
             loaded = True
-        for k in range(nodes.shape[1]):
+        for k in range(width[c]):
             du = Fx * link[c, k, 1] + Fy * link[c, k, 2] + Fz * link[c, k, 3]
             dv = Gx * link[c, k, 1] + Gy * link[c, k, 2] + Gz * link[c, k, 3]
             if loaded:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import warp as wp
 
-from surgisim.mpm.grid import same_nodes
+from surgisim.mpm.grid import cells_of
 from surgisim.mpm.kernels import ABREAST, law_functions, node_kernels, shapes
 from surgisim.mpm.march import Phases
 
@@ -27,19 +27,18 @@ class ByParticle:
         s = shapes(precision)
         self.kernels, self.node_kernels = particle_kernels(terms, precision), node_kernels(precision)
         self.laws, self.types = self.kernels.laws, s
-        local, links = (_padded(a) for a in (local, links))
-        nodes, cell = same_nodes(local)
+        nodes, cell, width, links = cells_of(*(_padded(a) for a in (local, links)))
         self.order = np.argsort(cell, kind="stable")
         # Neighbouring threads, which step neighbouring particles, read neighbouring numbers; cells read whole rows.
         self.rows = put(links[self.order], s.Link)
         self.links = [
-            put(np.swapaxes(a[self.order], 0, 1), kind).transpose() for a, kind in ((local, int), (links, s.Link))
+            put(np.swapaxes(a[self.order], 0, 1), kind).transpose() for a, kind in ((nodes[cell], int), (links, s.Link))
         ]
+        self.links.append(put(-(-width // ABREAST)[cell][self.order], int))
         # Rows of odd length: at powers of two the sums of neighbouring cells push each other out of the cache.
         self.shape, self.stride = nodes.shape, nodes.shape[1] | 1
         self.begin = put(np.searchsorted(np.sort(cell), np.arange(len(nodes) + 1)), int)
-        used = np.zeros(nodes.shape, bool)
-        np.logical_or.at(used, cell, links.any(-1))
+        used = np.arange(nodes.shape[1]) < width[:, None]
         at = np.arange(len(nodes))[:, None] * self.stride + np.arange(nodes.shape[1])
         start, entry, node, part = _pieces(nodes[used], at[used], filler=self.sums)
         self.parts = int(part.max()) + 1
@@ -118,6 +117,7 @@ def particle_kernels(names: tuple[str, ...], precision: str = "single") -> Simpl
         v: wp.array2d(dtype=Vec),
         index: wp.array2d(dtype=int),
         link: wp.array2d(dtype=Link),
+        blocks: wp.array(dtype=int),
         slot: int,
         p: int,
     ):
@@ -127,7 +127,7 @@ def particle_kernels(names: tuple[str, ...], precision: str = "single") -> Simpl
         d00, d01, d02 = real(0.0), real(0.0), real(0.0)
         d10, d11, d12 = real(0.0), real(0.0), real(0.0)
         d20, d21, d22 = real(0.0), real(0.0), real(0.0)
-        for block in range(index.shape[1] / wp.static(ABREAST)):
+        for block in range(blocks[p]):
             for j in range(wp.static(ABREAST)):
                 k = block * wp.static(ABREAST) + j
                 i = index[p, k]
@@ -163,6 +163,7 @@ def particle_kernels(names: tuple[str, ...], precision: str = "single") -> Simpl
         f_bar: wp.array(dtype=Vec),
         index: wp.array2d(dtype=int),
         link: wp.array2d(dtype=Link),
+        blocks: wp.array(dtype=int),
         slot: int,
         p: int,
     ):
@@ -176,7 +177,7 @@ def particle_kernels(names: tuple[str, ...], precision: str = "single") -> Simpl
         a10, a11, a12 = real(0.0), real(0.0), real(0.0)
         a20, a21, a22 = real(0.0), real(0.0), real(0.0)
         g0, g1, g2 = real(0.0), real(0.0), real(0.0)
-        for block in range(index.shape[1] / wp.static(ABREAST)):
+        for block in range(blocks[p]):
             for j in range(wp.static(ABREAST)):
                 k = block * wp.static(ABREAST) + j
                 i = index[p, k]
@@ -221,10 +222,15 @@ def particle_kernels(names: tuple[str, ...], precision: str = "single") -> Simpl
 
     @wp.func
     def carried(
-        field: wp.array2d(dtype=Vec), index: wp.array2d(dtype=int), link: wp.array2d(dtype=Link), slot: int, p: int
+        field: wp.array2d(dtype=Vec),
+        index: wp.array2d(dtype=int),
+        link: wp.array2d(dtype=Link),
+        blocks: wp.array(dtype=int),
+        slot: int,
+        p: int,
     ):
         total = Vec()
-        for k in range(index.shape[1]):
+        for k in range(blocks[p] * wp.static(ABREAST)):
             total += link[p, k][0] * field[slot, index[p, k]]
         return total
 
@@ -233,6 +239,7 @@ def particle_kernels(names: tuple[str, ...], precision: str = "single") -> Simpl
         clock: wp.array(dtype=int),
         index: wp.array2d(dtype=int),
         link: wp.array2d(dtype=Link),
+        blocks: wp.array(dtype=int),
         volume: wp.array(dtype=real),
         rho: wp.array(dtype=real),
         rest: wp.array(dtype=Vec),
@@ -249,14 +256,14 @@ def particle_kernels(names: tuple[str, ...], precision: str = "single") -> Simpl
     ):
         p = wp.tid()
         slot = clock[0] % slots
-        F, Fdot = kinematics(u, v, index, link, slot, p)
+        F, Fdot = kinematics(u, v, index, link, blocks, slot, p)
         x = Vec()
         y = Vec()
         if wp.static(laws.forces):
-            x = carried(u, index, link, slot, p)
-            y = carried(v, index, link, slot, p)
+            x = carried(u, index, link, blocks, slot, p)
+            y = carried(v, index, link, blocks, slot, p)
         elif anchors.member[p] > 0:
-            x = carried(u, index, link, slot, p)
+            x = carried(u, index, link, blocks, slot, p)
         piola, pull = answer(
             F,
             Fdot,
@@ -284,6 +291,7 @@ def particle_kernels(names: tuple[str, ...], precision: str = "single") -> Simpl
         clock: wp.array(dtype=int),
         index: wp.array2d(dtype=int),
         link: wp.array2d(dtype=Link),
+        blocks: wp.array(dtype=int),
         volume: wp.array(dtype=real),
         rho: wp.array(dtype=real),
         rest: wp.array(dtype=Vec),
@@ -308,14 +316,14 @@ def particle_kernels(names: tuple[str, ...], precision: str = "single") -> Simpl
     ):
         p = wp.tid()
         slot = clock[0] % slots
-        F, Fdot, A, b = kinematics_and_forces(u, v, f_bar, index, link, slot, p)
+        F, Fdot, A, b = kinematics_and_forces(u, v, f_bar, index, link, blocks, slot, p)
         x = Vec()
         y = Vec()
         if wp.static(laws.forces):
-            x = carried(u, index, link, slot, p)
-            y = carried(v, index, link, slot, p)
+            x = carried(u, index, link, blocks, slot, p)
+            y = carried(v, index, link, blocks, slot, p)
         elif anchors.member[p] > 0 and stiffness_bar.shape[1] > 0:
-            x = carried(u, index, link, slot, p)
+            x = carried(u, index, link, blocks, slot, p)
         dF, dFdot, dx, dy = answer_back(
             F, Fdot, x, y, A, b, p, clock[1], slot, dt, 0, volume, rho, rest, theta, anchors, q,
             q_bar, theta_bar, rho_bar, path_bar, hold_bar, stiffness_bar,

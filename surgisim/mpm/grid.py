@@ -92,3 +92,17 @@ def same_nodes(local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     rows = np.ascontiguousarray(local, ">i4").view(np.dtype((np.void, 4 * local.shape[1]))).ravel()
     _, first, cell = np.unique(rows, return_index=True, return_inverse=True)
     return local[first], cell
+
+
+def cells_of(local: np.ndarray, links: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Points (P, K), (P, K, 4) by the nodes they hang on: those nodes, (C, K), and their row there, (P,).
+
+    Of a row's nodes those come first that weigh something for any of its points; how many those are, (C,), and the
+    links in that order, come last.
+    """
+    nodes, cell = same_nodes(local)
+    used = np.zeros(nodes.shape, bool)
+    np.logical_or.at(used, cell, links.any(-1))
+    order = np.argsort(~used, axis=1, kind="stable")
+    moved = np.take_along_axis(links, order[cell][..., None], 1)
+    return np.take_along_axis(nodes, order, 1), cell, used.sum(1), moved

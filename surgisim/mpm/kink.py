@@ -18,6 +18,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from surgisim.mpm.grid import same_nodes
+
 FUNCTIONS = 4
 """Of each ball."""
 REACH = 3.0
@@ -51,12 +53,14 @@ class Kinks:
 
     def added(self, points: np.ndarray, index: np.ndarray, link: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Spline links (Q, L), (Q, L, 4) of points [m], (Q, 3), with those to the kinks near them."""
-        used = np.zeros(len(points), int)
+        used, cell = np.zeros(len(points), int), same_nodes(index)[1]
         blocks: list[tuple[np.ndarray, np.ndarray]] = []
         for b, (ball, fit) in enumerate(zip(self.balls, self.fits, strict=True)):
-            near = np.flatnonzero(self._away(ball, points) < REACH)
-            value, slope = _kinked(ball, points[near])
-            mine = fit[index[near]]
+            inside = self._away(ball, points) < REACH
+            # What hangs on the same splines hangs on the same kinks: a cell's points stay together.
+            near = np.flatnonzero(np.bincount(cell, inside)[cell])
+            value, slope = (a * inside[near].reshape(-1, *[1] * (a.ndim - 1)) for a in _kinked(ball, points[near]))
+            mine = fit[index[near]] * inside[near, None, None]
             value = value - np.einsum("qk,qkm->qm", link[near, :, 0], mine)
             slope = slope - np.einsum("qkd,qkm->qmd", link[near, :, 1:], mine)
             while len(blocks) <= (used[near].max() if len(near) else -1):
