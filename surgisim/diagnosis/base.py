@@ -16,6 +16,7 @@ from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Whitener
 from surgisim.diagnosis.tangent import Tangent, base_piola, tangent
+from surgisim.estimation.trial import at_once
 from surgisim.mpm.closing import follow
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import Prepared, Values
@@ -84,7 +85,7 @@ def bounded(x: np.ndarray, clip: Clip) -> np.ndarray:
 
 
 def fit_base(
-    clip: Clip, whiten: Whitener, nuisances: np.ndarray, memo: Memo, *, rounds: int = ROUNDS,
+    clip: Clip, whiten: Whitener, nuisances: np.ndarray, memo: Memo, *, rounds: int = ROUNDS, workers: int = 1,
     say: Callable[[str], None] = lambda text: None,
 ) -> Base:  # fmt: skip
     """Least squares over E, nu and eta, given nuisances whitened at one standard deviation, (N, M).
@@ -92,7 +93,8 @@ def fit_base(
     Begun anew, at most `rounds` times, where a run fits worse than the tangent and the short runs before it promised.
     """
     x, promised = START.copy(), np.inf
-    prepared = clip.prepared(TERMS)
+    bodies = [clip.prepared(TERMS) for _ in range(workers)]
+    prepared = bodies[0]
     carry = prepared.simulator.carry(clip.rest)
     space = metric(nuisances)
     for n in range(rounds + 1):
@@ -104,7 +106,7 @@ def fit_base(
         simulated = carried(carry, run)
         near = tangent(prepared, values_of(x), drive, run, clip.rest, clip.until)
         around = _Around(
-            clip, whiten, space, memo, prepared, carry, x, run, simulated[:, : clip.until],
+            clip, whiten, space, memo, bodies, carry, x, run, simulated[:, : clip.until],
             _by_poisson(prepared, near, x),
         )  # fmt: skip
         if n > 0 and (n == rounds or around.cost(x, around.left(x)) < promised + AGAIN):
@@ -124,29 +126,30 @@ class _Around:
     whiten: Whitener
     space: Metric
     memo: Memo
-    prepared: Prepared
+    bodies: list[Prepared]
+    """One for each short run at a time."""
     carry: object
     x: np.ndarray
     run: Run
     simulated: np.ndarray
     by_poisson: np.ndarray
 
-    def tracks(self, y: np.ndarray) -> np.ndarray:
+    def tracks(self, y: np.ndarray, body: int = 0) -> np.ndarray:
         """Displacement of the points [m], (K, T_fit, 3)."""
         first, last = _window(self.clip)
         rates = np.array([y[0], self.x[1], y[2]])
         what = ["short", self.x.tolist(), rates.tolist(), first, last]
         seen = self.memo(
-            what, lambda: {"seen": _short(self.clip, self.prepared, rates, self.run, self.carry, first, last)}
+            what, lambda: {"seen": _short(self.clip, self.bodies[body], rates, self.run, self.carry, first, last)}
         )["seen"]
         result = self.simulated.copy()
         result[:, first + 1 : last + 1] = seen
         return result + (y[1] - self.x[1]) * self.by_poisson
 
-    def left(self, y: np.ndarray) -> np.ndarray | None:
+    def left(self, y: np.ndarray, body: int = 0) -> np.ndarray | None:
         """Whitened residual, (N,); None where tissue like that is torn apart."""
         try:
-            return self.whiten(self.clip.moved[:, : self.clip.until] - self.tracks(y))
+            return self.whiten(self.clip.moved[:, : self.clip.until] - self.tracks(y, body))
         except Breakdown:
             return None
 
@@ -157,9 +160,9 @@ class _Around:
 
     def slopes(self, y: np.ndarray) -> np.ndarray:
         """Derivative of the points' displacement by y [m], (3, K, T_fit, 3)."""
-        middle = self.tracks(y)
-        rates = {k: (self.tracks(y + STEP * np.eye(3)[k]) - middle) / STEP[k] for k in (0, 2)}
-        return np.stack([rates[0], self.by_poisson, rates[2]])
+        aside = np.diag(STEP)
+        middle, stiffer, slower = at_once(self.tracks, [y, y + aside[0], y + aside[2]], len(self.bodies))
+        return np.stack([(stiffer - middle) / STEP[0], self.by_poisson, (slower - middle) / STEP[2]])
 
     def normal(self, slopes: np.ndarray) -> np.ndarray:
         J = self.whiten(slopes).T
@@ -167,8 +170,9 @@ class _Around:
 
     def starts(self) -> list[np.ndarray]:
         """A few stiffnesses and viscosities, best first: a ring-down misfits by whole periods."""
-        tries = [bounded(self.x + np.array([e, 0.0, lag]), self.clip) for e in SCAN for lag in SCAN]
-        return sorted([self.x, *tries], key=lambda y: self.cost(y, self.left(y)))
+        tries = [self.x, *(bounded(self.x + np.array([e, 0.0, lag]), self.clip) for e in SCAN for lag in SCAN)]
+        costs = at_once(lambda y, body: self.cost(y, self.left(y, body)), tries, len(self.bodies))
+        return [tries[n] for n in np.argsort(costs, kind="stable")]
 
     def softest(self, say: Callable[[str], None]) -> np.ndarray:
         """The best body, or a softer one that fits as well."""

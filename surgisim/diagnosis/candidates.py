@@ -20,7 +20,7 @@ Parts = Iterator[tuple[str, Callable[[], Iterator[Block]]]]
 """Names of parts, and what makes their blocks."""
 
 
-def blocks(clip: Clip, base: Base, only: np.ndarray | None = None) -> Parts:
+def blocks(clip: Clip, base: Base, memo: Memo, only: np.ndarray | None = None) -> Parts:
     """All that is tried, one part after the other, each made when it is asked for.
 
     only: where alone local laws are tried [m], (3,); None for everywhere.
@@ -33,7 +33,7 @@ def blocks(clip: Clip, base: Base, only: np.ndarray | None = None) -> Parts:
     yield "laws of the whole body", lambda: iter([whole.everywhere(clip, base)])
     turns = np.arange(whole.ANGLES) * np.pi / whole.ANGLES
     yield "strands", lambda: iter([whole.strands(clip, base, turns, (0.2,))])
-    yield "laws that remember", lambda: iter([memory.remembering(clip, base)])
+    yield "laws that remember", lambda: iter([memory.remembering(clip, base, memo=memo)])
     yield "weight", lambda: iter([whole.bulk(clip, base)])
     if clip.body.held.any():
         yield "breathing", lambda: iter([whole.breathing(clip, base)])
@@ -46,7 +46,7 @@ def blocks(clip: Clip, base: Base, only: np.ndarray | None = None) -> Parts:
     yield "contractions", lambda: whole.contracting(clip, base)
 
 
-def costly(clip: Clip, base: Base, memo: Memo) -> Parts:
+def costly(clip: Clip, base: Base, memo: Memo, workers: int) -> Parts:
     """What only runs of the engine can tell; tried where something is to be told."""
     if clip.body.held.any() and len(clip.motion.radius):
-        yield "a gliding base", lambda: memory.gliding(clip, base, memo)
+        yield "a gliding base", lambda: memory.gliding(clip, base, memo, workers)

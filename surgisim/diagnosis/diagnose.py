@@ -52,7 +52,7 @@ class Case:
     @property
     def workers(self) -> int:
         """Runs side by side."""
-        return self.settings.workers if self.clip.device == "cpu" else 1
+        return workers(self.clip, self.settings)
 
 
 def diagnose(
@@ -67,7 +67,7 @@ def diagnose(
     bend = flexible(case.clip, case.whiten, case.space, case.z, case.nulls)
     detected = max(entry[0] for entry in laws.values()) > threshold(laws, settings)
     if detected:
-        parts = costly(clip, case.base, memo)
+        parts = costly(clip, case.base, memo, case.workers)
         findings += search(case, case.z, case.nulls, lambda s, text: progress(0.62, 1, text), parts)
         laws = by_law(findings)
     ranked, refits = sorted(laws, key=lambda term: -laws[term][0]), []
@@ -107,6 +107,11 @@ def compete(case: Case, laws: dict, ranked: list[str], progress: Progress) -> tu
     return case, sorted(refits, key=lambda r: -r.log_evidence)
 
 
+def workers(clip: Clip, settings: Diagnosing) -> int:
+    """Runs side by side: on a GPU they would wait for each other."""
+    return settings.workers if clip.device == "cpu" else 1
+
+
 def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress) -> Case:
     """Noise, base, nuisances."""
     until = clip.until
@@ -124,7 +129,7 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
         if settings.model_error
         else np.zeros((3 * until * len(clip.kept), 1))
     )
-    base = fit_base(clip, whiten, wrong, memo, say=lambda text: progress(0.1, 1, text))
+    base = fit_base(clip, whiten, wrong, memo, workers=workers(clip, settings), say=lambda text: progress(0.1, 1, text))
     parts = [wrong, whiten(nuisance.camera(clip, base.simulated[:, fitted])).T, whiten(base.slopes).T]
     if settings.model_error and len(clip.motion.radius):
         parts.append(whiten(nuisance.grips(clip, base.tangent, until)).T)
@@ -139,7 +144,7 @@ def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts 
     """Every hypothesis of `parts` (or of all that is cheap) against a whitened residual."""
     residuals = np.concatenate([z[:, None].astype(np.float32), nulls], 1)
     only = worst(case.clip, case.base.simulated) if case.settings.cause == "symptom" else None
-    parts, found, source = list(parts or blocks(case.clip, case.base, only)), [], 0
+    parts, found, source = list(parts or blocks(case.clip, case.base, case.memo, only)), [], 0
     for n, (name, make) in enumerate(parts):
         progress(n / len(parts), f"trying {name} ({n + 1} of {len(parts)})")
         for block in make():
@@ -159,15 +164,17 @@ def threshold(laws: dict, settings: Diagnosing) -> float:
 def from_rest(case: Case, best: Refit, z: np.ndarray) -> bool:
     """Whether paths of grips count from where tissue was at rest: whether the best law fits clearly better that way."""
     law, until = law_of(best.finding.hypothesis, best.amplitude, case.clip), case.clip.until
-    costs = []
-    for shifted in (True, False):
-        try:
-            moved = respond(replace(case.clip, shifted=shifted), case.base, law, case.memo)
-        except IMPOSSIBLE:
-            return False
+
+    def cost(shifted: bool, _worker: int) -> float:
+        moved = respond(replace(case.clip, shifted=shifted), case.base, law, case.memo)
         left = z - case.whiten(moved[:, :until] - case.base.simulated[:, :until])
-        costs.append(float(case.space.gram(left[:, None], left[:, None])[0, 0]))
-    return costs[0] - costs[1] > calibration.THRESHOLD
+        return float(case.space.gram(left[:, None], left[:, None])[0, 0])
+
+    try:
+        found, rest = at_once(cost, [True, False], case.workers)
+    except IMPOSSIBLE:
+        return False
+    return found - rest > calibration.THRESHOLD
 
 
 def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:
@@ -194,9 +201,10 @@ def explained_by(case: Case, refits: list[Refit], bend: Flexible, progress: Prog
     if not settings.second:
         return refits, one
     pairs: dict[frozenset, list[Refit]] = {}
-    for n, first in enumerate(r for r in refits[:FIRSTS] if r.gain > calibration.CLOSE * refits[0].gain):
-        progress(0.86 + 0.03 * n, 1, f"what {first.term} leaves")
-        second = another(case, first, bend, progress)
+    firsts = [r for r in refits[:FIRSTS] if r.gain > calibration.CLOSE * refits[0].gain]
+    progress(0.86, 1, f"what {' and '.join(r.term for r in firsts)} leave{'s' if len(firsts) == 1 else ''}")
+    seconds = at_once(lambda first, _: another(case, first, bend), firsts, case.workers)
+    for first, second in zip(firsts, seconds, strict=True):
         if second is not None:
             terms = frozenset((first.term, second.term))
             pairs[terms] = max(pairs.get(terms, []), [first, second], key=promise)
@@ -216,7 +224,7 @@ def promise(pair: list[Refit]) -> float:
     return sum(r.gain for r in pair)
 
 
-def another(case: Case, first: Refit, bend: Flexible, progress: Progress) -> Refit | None:
+def another(case: Case, first: Refit, bend: Flexible) -> Refit | None:
     """The second effect that pays most once the first is there; None where none may do."""
     until = case.clip.until
     if verdict.still(case, bend, case.base.simulated + first.response) <= calibration.LITTLE_LEFT:
@@ -226,7 +234,7 @@ def another(case: Case, first: Refit, bend: Flexible, progress: Progress) -> Ref
     space = metric(np.concatenate([case.space.columns, white[:, None]], 1))
     left = replace(case, space=space)
     z = case.z - white
-    found = search(left, z, case.nulls, lambda s, text: progress(0.86 + 0.07 * s, 1, text))
+    found = search(left, z, case.nulls, lambda *_: None)
     laws = by_law([f for f in found if f.hypothesis.term != first.term])
     best = max(laws, key=lambda term: laws[term][0])
     if laws[best][0] < threshold(laws, case.settings):

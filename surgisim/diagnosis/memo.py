@@ -34,3 +34,6 @@ class Memo:
         np.savez(stream, **made)
         save_bytes({path: stream.getvalue()})
         return made
+
+
+NOTHING_KEPT = Memo(None, "")

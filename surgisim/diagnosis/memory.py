@@ -10,8 +10,9 @@ from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import Block
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import law_of, respond
-from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.memo import NOTHING_KEPT, Memo
 from surgisim.diagnosis.tangent import base_piola, piola
+from surgisim.estimation.trial import at_once
 from surgisim.mpm.simulator import Breakdown
 from surgisim.physics.catalogue import choose
 
@@ -34,8 +35,19 @@ FORMS = (
 )
 
 
-def remembering(clip: Clip, base: Base, forms=FORMS) -> Block:
+def remembering(clip: Clip, base: Base, forms=FORMS, memo: Memo = NOTHING_KEPT) -> Block:
     """Laws that remember: relaxation, plastic set, damage; followed along every frame."""
+    columns = memo(["remembering", base.x.tolist(), forms], lambda: {"columns": _followed(clip, base, forms)})[
+        "columns"
+    ]
+    eye = np.eye(len(forms))
+    return Block(
+        columns, [Hypothesis(n, eye[:, k : k + 1], 1, None, None, None, row) for k, (n, row) in enumerate(forms)]
+    )
+
+
+def _followed(clip: Clip, base: Base, forms) -> np.ndarray:
+    """What the points do with each of the laws [m], (H, K, T_fit, 3)."""
     near, laws = base.tangent, choose(["relaxation", "plastic_set", "damage"])
     until, count = clip.until, len(base.prepared.simulator.rest)
     memory = [np.zeros((count, laws[n].memory)) for n, _ in forms]
@@ -65,14 +77,10 @@ def remembering(clip: Clip, base: Base, forms=FORMS) -> Block:
                 P = (base_piola(base.prepared, base.values, F @ flow) @ np.swapaxes(flow, -1, -2) - stress) / SMALL
             loads[n, t] = near.of_stress(P)
         before = F
-    columns = np.stack([near.history(load) for load in loads])
-    eye = np.eye(len(forms))
-    return Block(
-        columns, [Hypothesis(n, eye[:, k : k + 1], 1, None, None, None, row) for k, (n, row) in enumerate(forms)]
-    )
+    return np.stack([near.history(load) for load in loads])
 
 
-def gliding(clip: Clip, base: Base, memo: Memo) -> Iterator[Block]:
+def gliding(clip: Clip, base: Base, memo: Memo, workers: int) -> Iterator[Block]:
     """A base that holds by friction: where it slides depends on where it slid, so the engine runs a few caps."""
     near, simulator = base.tangent, base.prepared.simulator
     held, volume = clip.body.held, simulator.volume_p
@@ -80,16 +88,18 @@ def gliding(clip: Clip, base: Base, memo: Memo) -> Iterator[Block]:
     across = np.eye(3) - np.outer(clip.normal, clip.normal)
     pull = max(float(np.linalg.norm(near.displacement(f)[held] @ across, axis=1).max()) for f in near.frames) * spring
     whole = float(volume[held].sum())
-    columns, found = [], []
-    for share in CAPS:
-        about = {"cap": share * pull * whole, "stiffness": spring * whole}
-        h = Hypothesis("sliding_base", np.ones((1, 1)), 1, None, None, None, about)
+    caps = [{"cap": share * pull * whole, "stiffness": spring * whole} for share in CAPS]
+    tried = [Hypothesis("sliding_base", np.ones((1, 1)), 1, None, None, None, about) for about in caps]
+
+    def moved(h: Hypothesis, _worker: int) -> np.ndarray | None:
         try:
-            moved = respond(clip, base, law_of(h, np.ones(1), clip), memo, clip.until)
+            return respond(clip, base, law_of(h, np.ones(1), clip), memo, clip.until)
         except Breakdown:
-            continue
-        columns.append(moved - base.simulated[:, : clip.until])
-        found.append(h)
+            return None
+
+    answers = list(zip(tried, at_once(moved, tried, workers), strict=True))
+    found = [h for h, answer in answers if answer is not None]
+    columns = [answer - base.simulated[:, : clip.until] for _, answer in answers if answer is not None]
     if columns:
         eye = np.eye(len(columns))
         yield Block(np.stack(columns), [replace(h, mix=eye[:, k : k + 1]) for k, h in enumerate(found)])

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -99,11 +100,16 @@ class Trial:
 def at_once(work: Callable[[Any, int], Any], items: list[Any], workers: int = WORKERS) -> list[Any]:
     """work(item, worker) for every item, in order; each worker has its own thread and device arrays."""
 
-    def mine(worker: int) -> list[Any]:
-        return [work(item, worker) for item in items[worker::workers]]
+    waiting, turn, results = iter(enumerate(items)), Lock(), [None] * len(items)
 
-    results: list[Any] = [None] * len(items)
+    def mine(worker: int) -> None:
+        while True:
+            with turn:
+                n, item = next(waiting, (None, None))
+            if n is None:
+                return
+            results[n] = work(item, worker)
+
     with ThreadPoolExecutor(workers) as pool:
-        for worker, done in enumerate(pool.map(mine, range(workers))):
-            results[worker::workers] = done
+        list(pool.map(mine, range(min(workers, len(items)))))
     return results
