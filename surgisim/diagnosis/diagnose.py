@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from surgisim.diagnosis.base import Base, fit_base
 from surgisim.diagnosis.candidates import Parts, blocks, costly
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.evidence import Finding, by_law, judge
-from surgisim.diagnosis.flexible import Flexible, flexible
+from surgisim.diagnosis.flexible import Bend, Flexible, flexible
 from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
 from surgisim.diagnosis.locate import worst
 from surgisim.diagnosis.memo import Memo
@@ -49,6 +50,11 @@ class Case:
     slopes: slice
     """Where the base's own columns stand in the metric."""
 
+    @cached_property
+    def flexible(self) -> Flexible:
+        """What any smooth residual could gain."""
+        return flexible(self.clip, self.whiten, self.space, self.nulls)
+
     @property
     def workers(self) -> int:
         """Runs side by side."""
@@ -64,7 +70,7 @@ def diagnose(
     case = prepare_case(clip, settings, memo, progress)
     findings = search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.4 * s, 1, text))
     laws = by_law(findings)
-    bend = flexible(case.clip, case.whiten, case.space, case.z, case.nulls)
+    bend = case.flexible.fit(case.z)
     detected = max(entry[0] for entry in laws.values()) > threshold(laws, settings)
     if detected:
         parts = costly(clip, case.base, memo, case.workers)
@@ -142,7 +148,7 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
 
 def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts | None = None) -> list[Finding]:
     """Every hypothesis of `parts` (or of all that is cheap) against a whitened residual."""
-    residuals = np.concatenate([z[:, None].astype(np.float32), nulls], 1)
+    residuals = case.space.cleared(np.concatenate([z[:, None].astype(np.float32), nulls], 1))
     only = worst(case.clip, case.base.simulated) if case.settings.cause == "symptom" else None
     parts, found, source = list(parts or blocks(case.clip, case.base, case.memo, only)), [], 0
     for n, (name, make) in enumerate(parts):
@@ -181,7 +187,7 @@ def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:
     """A law's best finding on two finer lattices, and the law's evidence with what that gains."""
     evidence, _, findings = law
     best = findings[0]
-    residual, seen = z[:, None].astype(np.float32), case.clip.seen[:, : case.clip.until]
+    residual, seen = case.space.cleared(z[:, None]), case.clip.seen[:, : case.clip.until]
     for step in (1.0, 0.5):
         for block in finer(case.clip, case.base, best.hypothesis, step):
             found = judge(block, case.whiten, case.space, residual, -1, seen)
@@ -189,7 +195,7 @@ def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:
     return best, evidence + 0.5 * (best.gain - findings[0].gain)
 
 
-def explained_by(case: Case, refits: list[Refit], bend: Flexible, progress: Progress) -> tuple[list, Together]:
+def explained_by(case: Case, refits: list[Refit], bend: Bend, progress: Progress) -> tuple[list, Together]:
     """What may be named: the best law, or two that fit clearly better together; and the laws, the named one first."""
     settings = case.settings
     free = settings.free > 0 and 2 * fit_of_a_law(case) < settings.budget
@@ -224,7 +230,7 @@ def promise(pair: list[Refit]) -> float:
     return sum(r.gain for r in pair)
 
 
-def another(case: Case, first: Refit, bend: Flexible) -> Refit | None:
+def another(case: Case, first: Refit, bend: Bend) -> Refit | None:
     """The second effect that pays most once the first is there; None where none may do."""
     until = case.clip.until
     if verdict.still(case, bend, case.base.simulated + first.response) <= calibration.LITTLE_LEFT:

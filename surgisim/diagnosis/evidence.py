@@ -40,11 +40,11 @@ class Finding:
     """RMS of its signature at the most likely amplitude [m]."""
 
 
-def judge(block: Block, whiten, space: Metric, residuals: np.ndarray, source: int, seen: np.ndarray) -> list[Finding]:
-    """Every hypothesis of a block against residuals (N, 1 + D), the recording's first, then nulls."""
+def judge(block: Block, whiten, space: Metric, cleared: np.ndarray, source: int, seen: np.ndarray) -> list[Finding]:
+    """Every hypothesis of a block against residuals that `space` cleared, (N, 1 + D): the recording's, then nulls."""
     white = whiten(block.columns).T.astype(np.float32)
     gram = space.gram(white, white)
-    shadow = space.gram(white, residuals)
+    shadow = (white.T @ cleared).astype(float)
     mask = seen[None, :, :, None]
     plain = np.einsum("ckti,dkti->cd", block.columns * mask, block.columns, optimize=True) / seen.sum()
     return [weigh(h, gram, shadow, plain, source) for h in block.hypotheses]

@@ -19,26 +19,50 @@ SIZE = 6e-4
 
 
 @dataclass(frozen=True)
-class Flexible:
+class Bend:
+    """A smooth field, fitted."""
+
     gain: float
     """Of chi square, less what it gains on nulls on average."""
     fitted: np.ndarray
     """[m], (K, T_fit, 3)."""
 
 
-def flexible(clip: Clip, whiten: Whitener, space: Metric, z: np.ndarray, nulls: np.ndarray) -> Flexible:
-    """A smooth field fitted to a whitened residual (N,), each coefficient with the same modest prior.
+@dataclass(frozen=True)
+class Flexible:
+    """Smooth fields, each coefficient with the same modest prior."""
 
-    nulls: residuals of nothing, (N, D), on which the same is done.
-    """
-    columns = _columns(clip, clip.until)
-    white = whiten(columns).T.astype(np.float32)
-    gram, shadow = space.gram(white, white), space.gram(white, np.concatenate([z[:, None], nulls], 1))
+    field: np.ndarray
+    """Of one component, (M, K, T_fit)."""
+    cleared: np.ndarray
+    """Whitened, and cleared by the metric, (N, 3 M) float32."""
+    gram: np.ndarray
+    """(3 M, 3 M)"""
+    by_chance: float
+    """Of chi square, gained on nulls on average."""
+
+    def fit(self, z: np.ndarray) -> Bend:
+        """To a whitened residual (N,)."""
+        shadow = (self.cleared.T @ z.astype(np.float32)).astype(float)[:, None]
+        x, gains = _fitted(self.gram, shadow)
+        parts = x.reshape(3, len(self.field))
+        return Bend(float(gains[0]) - self.by_chance, np.einsum("em,mkt->kte", parts, self.field, optimize=True))
+
+
+def flexible(clip: Clip, whiten: Whitener, space: Metric, nulls: np.ndarray) -> Flexible:
+    """The fields of a clip; nulls: residuals of nothing, (N, D)."""
+    field = np.einsum("km,bt->mbkt", _patterns(clip), _courses(clip.until)).reshape(-1, len(clip.rest), clip.until)
+    white = whiten(np.concatenate([field[..., None] * e for e in np.eye(3)])).T.astype(np.float32)
+    gram, cleared = space.gram(white, white), space.cleared(white)
+    _, gains = _fitted(gram, (cleared.T @ nulls.astype(np.float32)).astype(float))
+    return Flexible(field, cleared, gram, float(gains.mean()))
+
+
+def _fitted(gram: np.ndarray, shadow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients (3 M, C) and what they gain, (C,)."""
     unit = SIZE / np.sqrt(3 * PATTERNS)
-    A = gram + np.eye(len(gram)) / unit**2
-    x = np.linalg.solve(A, shadow)
-    gains = (x * (2 * shadow - gram @ x)).sum(0)
-    return Flexible(float(gains[0] - gains[1:].mean()), np.tensordot(x[:, 0], columns, 1))
+    x = np.linalg.solve(gram + np.eye(len(gram)) / unit**2, shadow)
+    return x, (x * (2 * shadow - gram @ x)).sum(0)
 
 
 def smooth_part(clip: Clip, residual: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -49,11 +73,6 @@ def smooth_part(clip: Clip, residual: np.ndarray, seen: np.ndarray) -> np.ndarra
     A = design[:, seen]
     normal = A @ A.T + 1e-6 * np.trace(A @ A.T) / len(A) * np.eye(len(A))
     return np.einsum("nc,nkt->ktc", np.linalg.solve(normal, A @ residual[seen]), design)
-
-
-def _columns(clip: Clip, frames: int) -> np.ndarray:
-    field = np.einsum("km,bt->mbkt", _patterns(clip), _courses(frames)).reshape(-1, len(clip.rest), frames)
-    return np.concatenate([field[..., None] * e for e in np.eye(3)])
 
 
 def _patterns(clip: Clip) -> np.ndarray:

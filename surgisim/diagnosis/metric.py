@@ -24,10 +24,15 @@ class Metric:
     def gram(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """<a, b> of columns (N, C) and (N, D)."""
         plain = (a.T.astype(np.float32) @ b.astype(np.float32)).astype(float)
-        return plain - self.seen_through(a).T @ cho_solve(self.factor, self.seen_through(b))
+        mine = self.seen_through(a)
+        return plain - mine.T @ cho_solve(self.factor, mine if b is a else self.seen_through(b))
+
+    def cleared(self, vectors: np.ndarray) -> np.ndarray:
+        """(1 + U U^T)^-1 of vectors (N, C), float32: their plain products with others are those of `gram`."""
+        return vectors.astype(np.float32) - self.explained(vectors)
 
     def explained(self, vector: np.ndarray) -> np.ndarray:
-        """The part of a vector (N,) that the directions take: nuisances at their most likely values."""
+        """The part of vectors (N,) or (N, C) that the directions take: nuisances at their most likely values."""
         return self.columns @ cho_solve(self.factor, self.seen_through(vector)).astype(np.float32)
 
     def draw(self, rng: np.random.Generator, count: int, project) -> np.ndarray:

@@ -14,7 +14,6 @@ from surgisim.diagnosis.clip import PHASES
 from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.errors import errors, residual, rms
 from surgisim.diagnosis.experiment import separating
-from surgisim.diagnosis.flexible import flexible
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import described, law_of
 from surgisim.diagnosis.locate import cause, of_places, symptom
@@ -251,7 +250,7 @@ def still(case, bend, after: np.ndarray) -> float:
     """Share of what a smooth field could explain that is left beside a prediction."""
     clip = case.clip
     z = case.z - case.whiten(after[:, : clip.until] - case.base.simulated[:, : clip.until])
-    return explainable(flexible(clip, case.whiten, case.space, z, case.nulls)) / max(explainable(bend), 1e-9)
+    return explainable(case.flexible.fit(z)) / max(explainable(bend), 1e-9)
 
 
 def explainable(bend) -> float:
