@@ -46,5 +46,4 @@ def test_a_node_gathers_only_what_weighs_something(monkeypatch):
         made = prepare(slab(), tuple(VALUES), density=1050.0, grips=grips).simulator
         start, _, node, _ = (a.numpy() for a in made.layout.pieces)
         gathered[name] = np.bincount(node, np.diff(start))[: made.rule.shape[1]]
-    # A grip parts the particles of a cell, those it reaches from those it does not, and no more.
-    assert gathered["two"].max() <= 2 * gathered["none"].max()
+    assert (gathered["two"] <= gathered["none"]).all()
