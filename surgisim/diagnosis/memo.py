@@ -4,8 +4,9 @@ import hashlib
 import io
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ class Memo:
     """None keeps nothing."""
     about: str
     """What all entries depend on: digests of recording, settings and code."""
+    making: dict[str, Lock] = field(default_factory=dict, repr=False, compare=False)
+    """Of each entry: a thread that wants what another one is making waits for it."""
 
     def __call__(self, what: Any, make: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
         """The arrays made for `what` (JSON-able), from the folder if they are there."""
@@ -26,13 +29,14 @@ class Memo:
             return make()
         key = hashlib.sha256(json.dumps([self.about, what], sort_keys=True).encode()).hexdigest()[:20]
         path = self.folder / f"{key}.npz"
-        if path.is_file():
-            with np.load(path, allow_pickle=False) as archive:
-                return dict(archive)
-        made = make()
-        stream = io.BytesIO()
-        np.savez(stream, **made)
-        save_bytes({path: stream.getvalue()})
+        with self.making.setdefault(key, Lock()):
+            if path.is_file():
+                with np.load(path, allow_pickle=False) as archive:
+                    return dict(archive)
+            made = make()
+            stream = io.BytesIO()
+            np.savez(stream, **made)
+            save_bytes({path: stream.getvalue()})
         return made
 
 

@@ -22,6 +22,7 @@ from surgisim.mpm.kernels import node_kernels, shapes, tick
 from surgisim.mpm.kink import Ball
 from surgisim.mpm.march import March, Phases
 from surgisim.mpm.nodes import Nodes
+from surgisim.mpm.stream import Stream
 from surgisim.physics.catalogue import choose, columns
 from surgisim.problem import Problem
 
@@ -107,18 +108,28 @@ class Simulator(Nodes):
         # A kink's weights sum to nothing: its inertia is what keeps it as slow as a cell.
         inertia = grid.spacing**2 * (links[..., 1:] ** 2).sum(-1)
         self._local, self._weight = local, np.where(local < self.rule.shape[1], links[..., 0], inertia)
-        s = self.types
-        self.gravity = s.Vec(*gravity)
+        self.gravity, self.stream = self.types.Vec(*gravity), Stream(device)
+        with self.stream.turn():
+            self._settle(local, links)
+
+    def _settle(self, local: np.ndarray, links: np.ndarray) -> None:
+        """What every run needs, on the device; local and links as of `Nodes.links`."""
+        s, device = self.types, self.device
         layout = ByCell if by_cell(device) else ByParticle
-        self.layout = layout(local, links, len(self.place), self.terms, precision, threads, self._put)
+        self.layout = layout(local, links, len(self.place), self.terms, self.precision, self.threads, self._put)
         self.order, self.laws = self.layout.order, self.layout.laws
         self.volume, self.rest_d = self._put(self.volume_p[self.order], s.real), self._put(self.rest[self.order], s.Vec)
-        self.nodes = node_kernels(precision)
+        self.nodes = node_kernels(self.precision)
         self.width = self.laws.memory
         self.mass = self._put(self.node_mass(np.full(self.count, self.density)), s.real)
         self.clock = wp.zeros(2, dtype=int, device=device)
         self.trouble = self._put(np.tile([NEVER, 0], (self.layout.parts, 1)), int)
         self.force = wp.zeros((self.layout.parts, len(self.place)), dtype=s.Vec, device=device)
+        if self.stream.later:
+            # Where a state arrives from the device: u, v, memory and trouble.
+            kinds = [(len(self.place), s.Vec)] * 2 + [(self.count if self.width else 1, self.laws.Memory)]
+            self.hosts = [wp.empty(n, dtype=kind, device="cpu", pinned=True) for n, kind in kinds]
+            self.hosts.append(wp.empty(self.trouble.shape, dtype=int, device="cpu", pinned=True))
         # Loaded here, once: two threads that load one module at their first launch crash the process.
         for kernel in (self.layout.kernels.step, self.layout.kernels.adjoint, *vars(self.nodes).values(), tick):
             wp.load_module(kernel.module, device=device)
@@ -158,15 +169,17 @@ class Simulator(Nodes):
     ) -> Iterator[tuple[State, wp.array]]:
         """As `run`, frame by frame: the state, and the nodal displacement where it lies on the device, (A,) vec3."""
         last = drive.frames - 1 if last is None else last
-        task = self._task(theta, drive, 2)
-        self._load(task, begin or (), first * drive.per_frame)
-        state = self._state(task, 0)
+        with self.stream.turn():
+            task = self._task(theta, drive, 2)
+            self._load(task, begin or (), first * drive.per_frame)
+        state, _ = self._arrived(task, 0)
         yield state, task.u[0]
         for frame in range(first, last):
-            task.forward.march(drive.per_frame)
+            with self.stream.turn():
+                task.forward.march(drive.per_frame)
             slot = (frame + 1 - first) * drive.per_frame % 2
-            before, state = state, self._state(task, slot)
-            self._check(before, state, theta, drive, frame)
+            before, (state, trouble) = state, self._arrived(task, slot)
+            self._check(before, state, trouble, theta, drive, frame)
             yield state, task.u[slot]
 
     # Backward
@@ -187,9 +200,11 @@ class Simulator(Nodes):
         memory_mb: what the states of a stretch may take; raises Problem if that is too little for one frame.
         springs: whether also by the anchors' hold and stiffness.
         """
-        per = drive.per_frame
-        stretch = self._stretch(per, memory_mb)
-        task = self._task(theta, drive, stretch + 1)
+        with self.stream.turn():
+            return self._gradient(theta, drive, run, u_bar, first, self._stretch(drive.per_frame, memory_mb), springs)
+
+    def _gradient(self, theta, drive: Drive, run: Run, u_bar: np.ndarray, first: int, stretch: int, springs: bool):
+        per, task = drive.per_frame, self._task(theta, drive, stretch + 1)
         back = self._back(task, drive, springs)
         back.u[0].assign(u_bar[-1].astype(self.real))
         for frame in range(len(run.u) - 1, 0, -1):
@@ -215,7 +230,7 @@ class Simulator(Nodes):
         self._load(task, state, step)
         for _ in range(math.ceil(count / stretch) - 1):
             task.forward.march(stretch)
-            starts.append(self._state(task, stretch))
+            starts.append(self._arrived(task, stretch)[0])
             self._load(task, starts[-1], step + (len(starts) - 1) * stretch)
         for k in reversed(range(len(starts))):
             length = min(stretch, count - k * stretch)
@@ -336,9 +351,17 @@ class Simulator(Nodes):
         self.clock.assign(np.array([0, step], np.int32))
         self.trouble.assign(np.tile(np.array([NEVER, 0], np.int32), (self.layout.parts, 1)))
 
-    def _state(self, task: "_Task", slot: int) -> State:
-        u, v, q = (array[slot].numpy().copy() for array in (task.u, task.v, task.q))
-        return u, v, self._by_particle(q) if self.width else np.zeros((self.count, 0), self.real)
+    def _arrived(self, task: "_Task", slot: int) -> tuple[State, np.ndarray]:
+        """The state in a slot, once it is there, and what trouble there was on the way."""
+        arrays = [task.u[slot], task.v[slot], task.q[slot], self.trouble]
+        if self.stream.later:
+            with self.stream.turn():
+                for host, array in zip(self.hosts, arrays, strict=True):
+                    wp.copy(host, array)
+            self.stream.wait()
+            arrays = self.hosts
+        u, v, q, trouble = (array.numpy().copy() for array in arrays)
+        return (u, v, self._by_particle(q) if self.width else np.zeros((self.count, 0), self.real)), trouble
 
     def _by_particle(self, sorted_rows: np.ndarray) -> np.ndarray:
         """Rows in the device's order, in that of `rest`."""
@@ -346,9 +369,11 @@ class Simulator(Nodes):
         rows[self.order] = sorted_rows
         return rows
 
-    def _check(self, before: State, after: State, theta: np.ndarray, drive: Drive, frame: int) -> None:
+    def _check(
+        self, before: State, after: State, trouble: np.ndarray, theta: np.ndarray, drive: Drive, frame: int
+    ) -> None:
         """Stop where the last frame went wrong, and say where, when and by which law."""
-        step, sorted_particle = min(self.trouble.numpy().tolist())
+        step, sorted_particle = min(trouble.tolist())
         if step == NEVER and np.isfinite(after[0]).all():
             return
         if step == NEVER:
@@ -356,10 +381,12 @@ class Simulator(Nodes):
                 f"simulation: a displacement is not finite between frames {frame} and {frame + 1}. Take a smaller step."
             )
         particle = int(self.order[sorted_particle])
-        task = self._task(theta, drive, 2)
-        self._load(task, before, frame * drive.per_frame)
-        task.forward.march(max(0, step - frame * drive.per_frame - 1))
-        law = culprit(self, theta, self._state(task, max(0, step - frame * drive.per_frame - 1) % 2), particle)
+        count = max(0, step - frame * drive.per_frame - 1)
+        with self.stream.turn():
+            task = self._task(theta, drive, 2)
+            self._load(task, before, frame * drive.per_frame)
+            task.forward.march(count)
+        law = culprit(self, theta, self._arrived(task, count % 2)[0], particle)
         where = np.round(self.rest[particle], 4).tolist()
         raise Breakdown(
             f"simulation: particle {particle} at rest position {where} m turned inside out (or stopped being a "

@@ -5,6 +5,7 @@ import pytest
 import warp as wp
 from slab import pulled, slab
 
+from surgisim.estimation.trial import at_once
 from surgisim.mpm.setup import prepare
 
 VALUES = {"corotated": {"E": 1500.0, "nu": 0.42}, "newtonian": {"eta": 2.0}}
@@ -30,3 +31,10 @@ def test_both_devices_move_the_body_alike_and_agree_on_the_gradient():
 
 def test_two_runs_on_a_gpu_give_the_same_bytes():
     assert one("cuda")[0].tobytes() == one("cuda")[0].tobytes()
+
+
+def test_threads_side_by_side_get_what_one_alone_does():
+    (alone, gradient), several = one("cuda"), at_once(lambda device, _: one(device), ["cuda"] * 6, 3)
+    for u, theirs in several:
+        assert u.tobytes() == alone.tobytes()
+        assert theirs.tobytes() == gradient.tobytes()
