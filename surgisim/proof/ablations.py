@@ -10,6 +10,8 @@ FIGURES = {
     "top1": "named rightly",
     "top2": "among the first two names",
     "false_discovery": "false discovery",
+    "alarm": "nothing concealed, called unexplained",
+    "wrong_names": "names that are wrong",
     "held_back": "outside the catalogue: held back",
     "place_right": "placed within 1.5 cells",
     "cut": "held-out cut of the oracle's, median",
@@ -21,10 +23,12 @@ def losses(boards: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """Each figure of each way over all ratios, and how often cases differ from the method's, which comes first.
 
     gained, lost: cases that only this way names rightly, and that only the method does; p of McNemar's exact test, in
-    which chance would make the two equal. Raises Problem where two ways did not see the same cases.
+    which chance would make the two equal. cases: what each way says of every one.
+    Raises Problem where two ways did not see the same cases.
     """
     method, *_ = boards
-    answers = {way: {c["recording"]: _right(c) for c in board["cases"]} for way, board in boards.items()}
+    told = {way: {c["recording"]: c for c in board["cases"]} for way, board in boards.items()}
+    answers = {way: {recording: _right(c) for recording, c in found.items()} for way, found in told.items()}
     for way, found in answers.items():
         if found.keys() != answers[method].keys():
             raise Problem(f"ablations: '{way}' and '{method}' were not scored on the same cases. Score them all.")
@@ -37,7 +41,26 @@ def losses(boards: dict[str, dict[str, Any]]) -> dict[str, Any]:
         pairs = [(answers[method][r], found[r]) for r in found if found[r] is not None]
         lost, gained = (sum(a == x and b != x for a, b in pairs) for x in (True, False))
         changes[way] = {"lost": lost, "gained": gained, "count": len(pairs), "p": _exact(lost, gained)}
-    return {"format": "surgisim-ablations/1", "ways": list(boards), "rows": rows, "changes": changes}
+    cases = [
+        {
+            "case": case["case"],
+            "concealed": [effect["term"] for effect in case["concealed"]],
+            "snr": case["snr"],
+            "said": {way: _said(found[case["recording"]]) for way, found in told.items()},
+        }
+        for case in boards[method]["cases"]
+    ]
+    return {"format": "surgisim-ablations/2", "ways": list(boards), "rows": rows, "changes": changes, "cases": cases}
+
+
+def _said(case: dict[str, Any]) -> dict[str, Any]:
+    """What one way's verdict names, with what probability, and whether that is right."""
+    return {
+        "verdict": case["verdict"],
+        "named": [{"term": e["term"], "probability": e["probability"]} for e in case["named"]],
+        "right": _right(case),
+        "alarm": not case["concealed"] and case["verdict"] == "unexplained",
+    }
 
 
 def _right(case: dict[str, Any]) -> bool | None:

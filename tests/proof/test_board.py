@@ -183,10 +183,16 @@ def test_the_page_needs_nothing_beside_itself_and_the_table_has_every_case(run):
 def test_what_a_part_is_worth_is_what_is_lost_without_it(run):
     cases = run[1]
     worse = [c | {"top1": False} if c["top1"] and c["case"] in (1, 2) else c for c in cases]
+    worse = [c | {"verdict": "unexplained"} if c["kind"] == "nothing" else c for c in worse]
     found = losses({"main": scoreboard(cases), "iid": scoreboard(worse)})
     assert found["changes"]["iid"] == {"lost": 2, "gained": 0, "count": 8, "p": 0.5}
     assert found["changes"]["main"]["p"] == 1.0
+    alarms = next(row["values"] for row in found["rows"] if row["figure"] == "alarm")
+    assert [alarms[way]["hits"] for way in ("main", "iid")] == [0, 1]
+    empty = found["cases"][5]
+    assert (empty["concealed"], empty["said"]["main"]["alarm"], empty["said"]["iid"]["alarm"]) == ([], False, True)
     text = ablations_page(found).decode()
     assert "residuals taken as independent" in text
+    assert text.count('<td class="no">unexplained') == 1
     with pytest.raises(Problem, match="not scored on the same cases"):
         losses({"main": scoreboard(cases), "iid": scoreboard(worse[1:])})

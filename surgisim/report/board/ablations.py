@@ -12,6 +12,7 @@ WORDS = {
     "no_offset": "no reference offset of the points",
     "no_nulls": "no calibration on nulls",
     "no_model_error": "no error of the simulator itself",
+    "no_cause_map": "local laws only where the misfit is largest",
     "until_load": "fitted until the load ends",
     "until_hold": "fitted until the hold ends",
     "shuffled": "another case's paths",
@@ -20,4 +21,11 @@ WORDS = {
 
 def page(found: dict[str, Any]) -> bytes:
     """UTF-8."""
-    return template("ablations.html.j2").render(**found, told=told, shown=shown, words=WORDS).encode()
+    return template("ablations.html.j2").render(**found, told=told, shown=shown, words=WORDS, mark=mark).encode()
+
+
+def mark(said: dict[str, Any]) -> str:
+    """How a verdict's cell is coloured: alarms and wrong verdicts stand out."""
+    if said["alarm"] or said["right"] is False:
+        return "no"
+    return "yes" if said["right"] else ""
