@@ -126,7 +126,7 @@ def write(
         effects[0]["separating_experiment"] = separating(
             clip, base, *pair, case.memo, (refits[0].term, refits[1].term), rng, case.workers
         )
-    said = _words(case, said_of, refits, laws, z)
+    said = _words(case, said_of, refits, laws, z, held_out)
     above = detectable(case, laws)
     diagnosis = Diagnosis(
         recording=clip.recording.name,
@@ -363,10 +363,12 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
     return result
 
 
-def _words(case, said_of: Judgement, refits, laws, z) -> str:
+def _words(case, said_of: Judgement, refits, laws, z, held_out: dict) -> str:
     verdict, explained = said_of.verdict, said_of.explained
     if verdict == "nothing detectable":
-        return words.nothing(1e-3 * detectable(case, laws)[0])
+        before, noise = held_out["before"], held_out["noise_floor"]
+        later = (before, noise) if before is not None and before > calibration.SHOWS * noise else None
+        return words.nothing(1e-3 * detectable(case, laws)[0], later)
     if verdict == "unexplained" and draws(said_of.shares) and said_of.shares["left"] <= calibration.PUSH_LEAVES:
         return words.drawn(max(pushes(case.clip.recording, said_of.accepted), key=lambda push: push[0])[1])
     if verdict == "unexplained":

@@ -56,10 +56,15 @@ def _told(h: Hypothesis, parameters: dict[str, dict]) -> tuple[str, str]:
     return said, law.format(amount=amount)
 
 
-def nothing(above: float) -> str:
+def nothing(above: float, later: tuple[float, float] | None = None) -> str:
+    """later: misfit and noise of the frames held out [mm], where the misfit stands out."""
+    seen = f"Effects above {1e3 * above:.2g} mm RMS would mostly have been seen"
+    if later is None:
+        return f"Simulation and recording differ by no more than noise, camera and discretisation explain. {seen}."
     return (
-        "Simulation and recording differ by no more than noise, camera and discretisation explain. "
-        f"Effects above {1e3 * above:.2g} mm RMS would mostly have been seen."
+        "In the fitted frames simulation and recording differ by no more than noise, camera and discretisation "
+        f"explain; in those held out by {later[0]:.2g} mm RMS, where noise makes {later[1]:.2g}. "
+        f"{seen} in the fitted ones: to have the later ones searched, hold out fewer (split.json)."
     )
 
 

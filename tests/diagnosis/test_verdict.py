@@ -35,8 +35,13 @@ def tilted(memory):
 
 
 @pytest.fixture(scope="module")
-def plain():
-    return verdict()
+def nothing(tmp_path_factory):
+    return tmp_path_factory.mktemp("nothing")
+
+
+@pytest.fixture(scope="module")
+def plain(nothing):
+    return verdict(nothing)
 
 
 def test_a_change_of_weight_is_named(tilted):
@@ -74,6 +79,20 @@ def test_nothing_planted_is_nothing_named(plain):
     assert not found.effects
     assert set(physics.terms) == {"neo_hookean_ciarlet", "newtonian"}
     assert found.detectable_above["value"] > 0
+
+
+def test_what_shows_only_in_the_frames_held_out_is_said(plain, nothing, monkeypatch):
+    assert "held out" not in plain[0].words
+    errors = judging.errors
+
+    def late(*told):
+        fit, held_out = errors(*told)
+        return fit, held_out | {"before": 1.7 * held_out["noise_floor"]}
+
+    monkeypatch.setattr(judging, "errors", late)
+    found, _, _ = verdict(nothing)
+    assert found.verdict == "nothing detectable"
+    assert "in those held out by" in found.words
 
 
 def test_nulls_stay_below_the_threshold(plain, tilted):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.words import beaten, idle, sentence
+from surgisim.diagnosis.words import beaten, idle, nothing, sentence
 from surgisim.physics.place import Place
 
 PUSH = Hypothesis("hidden_contact", np.eye(3), 0, Place((-0.022, -0.007, 0.003), 0.003), 0.48, 1.2)
@@ -35,6 +35,16 @@ def test_a_number_without_a_unit_is_said_without_one():
 def test_a_load_is_said_in_grams():
     load = Hypothesis("added_mass", np.eye(1), 1, Place((0.0, 0.0, 0.0), 0.003), 0.6)
     assert "a weight there (mass = 8.6 g, 6.88 to 10.3)" in sentence([(load, of("mass", 8.6e-3, "kg"), 6e-4)], 1.0)
+
+
+def test_nothing_found_says_where_later_frames_differ_all_the_same():
+    assert nothing(2e-4) == (
+        "Simulation and recording differ by no more than noise, camera and discretisation explain. "
+        "Effects above 0.2 mm RMS would mostly have been seen."
+    )
+    said = nothing(2e-4, (1.07, 0.58))
+    assert "in those held out by 1.1 mm RMS, where noise makes 0.58." in said
+    assert "hold out fewer (split.json)" in said
 
 
 def test_a_law_that_a_placebo_beats_is_said_not_to_be_named():
