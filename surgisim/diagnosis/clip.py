@@ -128,7 +128,7 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
     thick = 2 * mesh.volume / mesh.area
     spacing = min(share * np.cbrt(mesh.volume), 0.9 * thick)
     body = recording.body(float(spacing))
-    until = fitted_until(recording)
+    until = recording.fitted_until
     rest = recording.attached()
     near = np.linalg.norm(rest[:, None] - body.rest[None].astype(float), axis=-1).min(1)
     usable = near < 1.5 * spacing
@@ -150,17 +150,6 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
     moved = recording.points[kept].astype(float) - rest[kept][:, None]
     moved = np.where(seen[..., None], moved, 0.0)
     return Clip(recording, body, kept, rest[kept], seen, moved, until, _normal(body, rest[kept]), device)
-
-
-def fitted_until(recording: Recording) -> int:
-    """The split's, or what precedes the second grasp, or seven tenths of the frames."""
-    if recording.split:
-        return recording.split["fit"][1]
-    active = recording.motion.active
-    first = sorted(int(a.argmax()) for a in active if a.any())
-    if len(first) > 1 and first[1] > 8:
-        return first[1] - 2
-    return max(1, round(0.7 * recording.frames))
 
 
 def _apart(rest: np.ndarray, seen: np.ndarray, most: int) -> np.ndarray:

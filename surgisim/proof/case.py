@@ -54,7 +54,7 @@ def score(
 
 def phases(recording: Recording) -> list[str]:
     """What goes on in the frames that may be fitted: rest, load, hold, release, second grasp."""
-    first, last = (recording.split or {}).get("fit", (0, recording.frames))
+    first, last = recording.split["fit"][0] if recording.split else 0, recording.fitted_until
     motion, found = recording.motion, []
     held = motion.active[:, first:last]
     if not held.size or not held[:, 0].any():

@@ -45,7 +45,7 @@ def rms(residual: np.ndarray, rest: slice, frames: slice) -> float:
 
 def held_out(truth: Truth, recording: Recording, verdict: Verdict, mismatch: Mismatch | None) -> dict | None:
     """The errors; None where no frame is held out. `before` and `after` are the mismatch's, or else as stated."""
-    span = (recording.split or {}).get("held_out", (0, 0))
+    span = recording.held_out
     if span[0] >= span[1]:
         return None
     held = recording.motion.active.any(0)

@@ -62,6 +62,25 @@ class Recording:
     def frames(self) -> int:
         return self.points.shape[1]
 
+    @property
+    def fitted_until(self) -> int:
+        """One past the last frame that may be fitted.
+
+        The split's, or what precedes the second time that tissue is taken hold of, or seven tenths of the frames.
+        """
+        if self.split:
+            return self.split["fit"][1]
+        busy = self.motion.active.any(0)
+        begins = np.flatnonzero(busy & ~np.r_[False, busy[:-1]])
+        if len(begins) > 1 and begins[1] > 8:
+            return int(begins[1]) - 2
+        return max(1, round(0.7 * self.frames))
+
+    @property
+    def held_out(self) -> tuple[int, int]:
+        """Frames that are not fitted and that the fit is held against, first and one past the last."""
+        return self.split["held_out"] if self.split else (self.fitted_until, self.frames)
+
     def attached(self) -> np.ndarray:
         """Rest position that each point is taken to follow [m], (K, 3): `place`, or where it is first seen."""
         if self.place is not None:

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -66,6 +67,27 @@ def test_a_recording_needs_no_grips_and_no_split(folder, gone):
     (folder / gone).unlink()
     read = read_recording(folder)
     assert (len(read.motion.active) == 0) if gone == "grip.npz" else read.split is None
+
+
+@pytest.mark.parametrize(
+    ("spans", "until"),
+    [
+        ([], 42),
+        ([(5, 40)], 42),
+        ([(10, 40), (11, 30)], 42),
+        ([(10, 30), (40, 55)], 38),
+        ([(10, 30), (20, 35), (40, 55)], 38),
+        ([(2, 4), (6, 55)], 42),
+    ],
+    ids=["no grip", "one", "two at once", "one after the other", "two, then a third", "a touch before anything"],
+)
+def test_without_a_split_the_second_manipulation_is_held_out_or_the_last_frames(spans, until):
+    made = recording(grips=len(spans), frames=60, split=None)
+    active = np.array([[first <= t < last for t in range(60)] for first, last in spans], bool).reshape(-1, 60)
+    made = replace(made, motion=replace(made.motion, active=active))
+    assert (made.fitted_until, made.held_out) == (until, (until, 60))
+    made = replace(made, split={"fit": (0, 20), "held_out": (25, 50)})
+    assert (made.fitted_until, made.held_out) == (20, (25, 50))
 
 
 def test_a_grip_that_has_let_go_needs_no_position(folder):

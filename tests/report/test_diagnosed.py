@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -85,6 +86,21 @@ def test_a_pull_in_words_is_drawn(tmp_path):
     found = read(made / "recording", made / "diagnosis.json", made / "mismatch.npz", made / "physics.json").experiment
     assert found["center"] == pytest.approx([0.03, 0.03, 0.02])
     assert found["pull"] == pytest.approx([0.0, 0.003, 0.004])
+
+
+def test_held_out_frames_are_marked_also_where_no_split_was_given(tmp_path):
+    made = made_up.case(tmp_path, extra=2e-3, told=VERDICTS["named"])
+    case = read(made / "recording", made / "diagnosis.json", made / "mismatch.npz", made / "physics.json")
+    assert case.grasped_anew == (b"tissue is grasped anew" in page(case))
+    case = replace(case, recording=replace(case.recording, split=None))
+    until = case.recording.fitted_until
+    assert 0 < until < case.recording.frames
+    assert case.split.tolist() == [0] * until + [2] * (case.recording.frames - until)
+
+
+def test_nothing_found_leaves_nothing_unexplained(tmp_path):
+    assert "Left unexplained" in shown(tmp_path / "a", VERDICTS["unexplained"]).decode()
+    assert "Left unexplained" not in shown(tmp_path / "b", VERDICTS["nothing detectable"]).decode()
 
 
 def test_names_do_not_become_markup(tmp_path):

@@ -40,9 +40,16 @@ class Diagnosed:
     def split(self) -> np.ndarray:
         """0 where a frame could be fitted, 2 where it was held out, (T,)."""
         held = np.zeros(self.recording.frames, int)
-        first, last = (self.recording.split or {}).get("held_out", (0, 0))
+        first, last = self.recording.held_out
         held[first:last] = 2
         return held
+
+    @property
+    def grasped_anew(self) -> bool:
+        """Whether tissue is taken hold of in the frames held out."""
+        first, last = self.recording.held_out
+        active = self.recording.motion.active
+        return bool((active[:, 1:] & ~active[:, :-1])[:, max(0, first - 1) : last].any())
 
     @property
     def up(self) -> np.ndarray:

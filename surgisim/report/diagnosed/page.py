@@ -69,7 +69,7 @@ def cards(case: Diagnosed) -> list[Card]:
     if verdict.detectable_above is not None:
         beside = "RMS over the tracked points: what is weaker is not seen in this clip"
         rows.append(Card("Detectable above", shown(verdict.detectable_above), "mm", beside, "", "plain"))
-    if verdict.unexplained is not None:
+    if verdict.unexplained is not None and verdict.verdict != "nothing detectable":
         nearest = "by nothing that is named" if verdict.names else "even by the law that comes nearest"
         beside = f"of the whitened misfit, {nearest}"
         rows.append(Card("Left unexplained", f"{100 * verdict.unexplained:.0f}", "%", beside, "", "plain"))
