@@ -68,6 +68,8 @@ def judged(case, laws, refits, fitted: Together, bend, over_placebo: float | Non
         "outward": max((out for out, _ in pushes(case.clip.recording, accepted)), default=None),
         "over_placebo": over_placebo,
     }
+    if faint(first.log_evidence, shares):
+        return nothing(case, laws, shares)
     explained = max(shares["gained"], shares["taken"])
     verdict = "named"
     if doubtful(first.term, shares):
@@ -91,18 +93,31 @@ def judged(case, laws, refits, fitted: Together, bend, over_placebo: float | Non
     return Judgement(verdict, accepted, chances, effects, float(explained), after, noise, shares)
 
 
+def nothing(case, laws, shares: dict[str, float | None]) -> Judgement:
+    """Where no law says what noise and the simulator's own error do not; shares: the best law's, where it was run."""
+    plain = case.base.simulated
+    chances = probabilities(laws, [], False)
+    if shares:
+        scale = min(1.0, shares["taken"] / 2 / max(chances.values()))
+        chances = {term: scale * chance for term, chance in chances.items()}
+    return Judgement("nothing detectable", [], chances, [], 0.0, plain, noise_beside(case, plain), shares)
+
+
+def faint(evidence: float, shares: dict[str, float | None]) -> bool:
+    """Whether what the best law gains is no more than the simulator's own error may feign.
+
+    Its evidence is that of small patterns that stand out of a small expected error; the misfit stays as it was.
+    """
+    return evidence < calibration.CLEAR and shares["taken"] < calibration.TAKEN
+
+
 def write(
     case, laws, ranked, refits, fitted: Together | None, bend, say: Callable[[str], None]
 ) -> tuple[Diagnosis, Physics, Mismatch]:
     """Everything a diagnosis leaves behind. refits: best first; fitted: of them what may be named, None for nothing."""
     clip, base = case.clip, case.base
     rng = np.random.default_rng([case.settings.seed, 1])
-    if fitted is not None:
-        said_of = judged(case, laws, refits, fitted, bend)
-    else:
-        plain = base.simulated
-        nothing = probabilities(laws, refits, False)
-        said_of = Judgement("nothing detectable", [], nothing, [], 0.0, plain, noise_beside(case, plain), {})
+    said_of = nothing(case, laws, {}) if fitted is None else judged(case, laws, refits, fitted, bend)
     shown = Replay(clip, base.simulated, said_of.after, None)
     if said_of.named:
         say("a placebo, and what is named on a finer grid")
@@ -137,7 +152,7 @@ def write(
         missing_phases=missing(clip),
         fit=fit,
         held_out=held_out,
-        unexplained_fraction=float(np.clip(1 - explained, 0, 1)) if fitted is not None else 0.0,
+        unexplained_fraction=float(np.clip(1 - explained, 0, 1)) if verdict != "nothing detectable" else 0.0,
         words=said,
         base=base_numbers(base),
         noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(noise).items()}

@@ -6,7 +6,7 @@ from planted import GRID, recording
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import verdict as judging
-from surgisim.diagnosis.calibration import THRESHOLD
+from surgisim.diagnosis.calibration import CLEAR, THRESHOLD
 from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.diagnose import diagnose, prepare_case, refit
 from surgisim.diagnosis.evidence import Finding
@@ -93,6 +93,21 @@ def test_what_shows_only_in_the_frames_held_out_is_said(plain, nothing, monkeypa
     found, _, _ = verdict(nothing)
     assert found.verdict == "nothing detectable"
     assert "in those held out by" in found.words
+
+
+def test_a_law_that_takes_nothing_off_the_error_is_not_detectable_unless_its_evidence_is_clear(
+    tilted, memory, monkeypatch
+):
+    assert tilted[0].global_test["log_evidence"] > CLEAR
+    monkeypatch.setattr(judging, "taken", lambda *_: 0.1)
+    assert verdict(memory, values=TILT)[0].verdict == "named"
+    monkeypatch.setattr(judging.calibration, "CLEAR", 1e9)
+    found, physics, _ = verdict(memory, values=TILT)
+    assert found.verdict == "nothing detectable"
+    assert not found.effects
+    assert "gravity" not in physics.terms
+    assert found.ranking[0]["probability"] <= 0.05
+    assert found.words.startswith("Simulation and recording differ by no more than noise")
 
 
 def test_nulls_stay_below_the_threshold(plain, tilted):
