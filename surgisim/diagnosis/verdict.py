@@ -68,7 +68,7 @@ def judged(case, laws, refits, fitted: Together, bend, over_placebo: float | Non
         "outward": max((out for out, _ in pushes(case.clip.recording, accepted)), default=None),
         "over_placebo": over_placebo,
     }
-    if faint(first.log_evidence, shares):
+    if case.settings.calibrated and faint(first.log_evidence, shares):
         return nothing(case, laws, shares)
     explained = max(shares["gained"], shares["taken"])
     verdict = "named"

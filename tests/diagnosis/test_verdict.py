@@ -20,8 +20,8 @@ SETTINGS = Diagnosing(grid=GRID, nulls=8, experiment=False, free=0)
 TILT = {"gravity": {"x": 8.0, "y": 0.0, "z": 0.0, "onset": -1.0}}
 
 
-def verdict(memory=None, **planted):
-    return diagnose(recording(**planted), SETTINGS, lambda *_: None, Memo(memory, ""))
+def verdict(memory=None, settings=SETTINGS, **planted):
+    return diagnose(recording(**planted), settings, lambda *_: None, Memo(memory, ""))
 
 
 @pytest.fixture(scope="module")
@@ -108,6 +108,8 @@ def test_a_law_that_takes_nothing_off_the_error_is_not_detectable_unless_its_evi
     assert "gravity" not in physics.terms
     assert found.ranking[0]["probability"] <= 0.05
     assert found.words.startswith("Simulation and recording differ by no more than noise")
+    uncalibrated = SETTINGS.model_copy(update={"calibrated": False})
+    assert verdict(memory, uncalibrated, values=TILT)[0].verdict == "named"
 
 
 def test_nulls_stay_below_the_threshold(plain, tilted):

@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from proof import made_up
 from proof.made_up import diagnosis, named
@@ -91,7 +92,11 @@ def test_a_pull_in_words_is_drawn(tmp_path):
 def test_held_out_frames_are_marked_also_where_no_split_was_given(tmp_path):
     made = made_up.case(tmp_path, extra=2e-3, told=VERDICTS["named"])
     case = read(made / "recording", made / "diagnosis.json", made / "mismatch.npz", made / "physics.json")
-    assert case.grasped_anew == (b"tissue is grasped anew" in page(case))
+    motion = case.recording.motion
+    for begins, anew in ((0, False), (case.recording.held_out[0], True)):
+        active = np.broadcast_to(np.arange(case.recording.frames) >= begins, motion.active.shape)
+        grasped = replace(case, recording=replace(case.recording, motion=replace(motion, active=active)))
+        assert (b"tissue is grasped anew" in page(grasped)) == anew
     case = replace(case, recording=replace(case.recording, split=None))
     until = case.recording.fitted_until
     assert 0 < until < case.recording.frames
