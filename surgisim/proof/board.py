@@ -8,6 +8,7 @@ from typing import Any
 from surgisim.problem import Problem
 from surgisim.proof.calibration import calibration, of_candidates, of_names
 from surgisim.proof.chance import chance
+from surgisim.proof.detection import detection
 from surgisim.proof.metadata import features, tells
 from surgisim.proof.naming import NOT_NAMED, common
 from surgisim.proof.shares import median, share
@@ -154,30 +155,6 @@ def confusion(cases: list[Case]) -> dict[str, Any]:
     across = inside + sorted(set(columns) - set(inside) - set(NOT_NAMED)) + [n for n in NOT_NAMED if n in columns]
     pairs = list(zip(rows, columns, strict=True))
     return {"rows": order, "columns": across, "counts": [[pairs.count((r, c)) for c in across] for r in order]}
-
-
-def detection(cases: list[Case]) -> dict[str, Any]:
-    """The probability of the right name against the ratio: every single case, and false alarms at ratio 0."""
-    points = [
-        {
-            "term": c["concealed"][0]["term"],
-            "snr": c["snr"],
-            "right": c["top1"],
-            "probability": c["probability_of_truth"],
-            "recording": c["recording"],
-        }
-        for c in cases
-        if c["kind"] == "one"
-    ]
-    edges = (0.5, 1.0, 1.5, 2.0, 3.0, 4.5, 10.0)
-    bins = []
-    for low, high in itertools.pairwise(edges):
-        mine = [p for p in points if low <= p["snr"] < high]
-        if mine:
-            mean = sum(p["snr"] for p in mine) / len(mine)
-            bins.append({"from": low, "to": high, "snr": mean, **share(p["right"] for p in mine).told()})
-    alarms = share(c["false_discovery"] for c in cases).told()
-    return {"points": points, "bins": bins, "false_alarms": alarms}
 
 
 def _row(case: Case) -> str:

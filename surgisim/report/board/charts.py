@@ -8,6 +8,8 @@ from surgisim.report.charts.paper import address, sheet
 from surgisim.report.palette import INK, LINE, MUTED, RECONSTRUCTION, REPLAY, TOOL
 
 RIGHT, WRONG, SILENT = TOOL, REPLAY, "#b9c1c9"
+PANELS = 6
+"""In a row."""
 Board = dict[str, Any]
 
 
@@ -79,30 +81,37 @@ def detection(found: dict[str, Any]) -> str | None:
 
 
 def laws(found: dict[str, Any]) -> str | None:
-    """Every single case, law by law: filled where it was named rightly, the higher in its row the surer."""
-    points = found["points"]
-    if not points:
+    """A panel a law: the curve with its band, and every single case, the higher the surer of the truth."""
+    rows = found["laws"]
+    if not rows:
         return None
-    terms = sorted({p["term"] for p in points})
-    with sheet(6.0, 0.9 + 0.36 * len(terms)) as figure:
-        axes = figure.subplots()
-        axes.grid(axis="y", visible=False)
-        for row, term in enumerate(terms):
-            axes.axhspan(row - 0.42, row + 0.42, color=LINE, alpha=0.28, lw=0, zorder=0)
-            for p in (p for p in points if p["term"] == term):
-                height = row + 0.36 - 0.72 * (p["probability"] or 0.0)
+    across = min(PANELS, len(rows))
+    down = -(-len(rows) // across)
+    with sheet(12.0, 0.75 + 1.75 * down) as figure:
+        panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
+        for axes in panels[len(rows) :]:
+            axes.set_axis_off()
+        for axes, row in zip(panels, rows, strict=False):
+            axes.fill_between(row["snr"], row["low"], row["high"], color=RECONSTRUCTION, alpha=0.13, lw=0)
+            axes.plot(row["snr"], row["value"], color=RECONSTRUCTION)
+            for p in (p for p in found["points"] if p["term"] == row["term"]):
                 color = RIGHT if p["right"] else WRONG
-                axes.plot(p["snr"], height, "o", ms=6, mfc=color if p["right"] else "white", mec=color, mew=1.4)
-        axes.axvline(3.0, color=MUTED, lw=0.9, ls=":")
-        axes.set_yticks(range(len(terms)), [t.replace("_", " ") for t in terms], color=INK)
-        axes.set_ylim(len(terms) - 0.5, -0.5)
-        axes.set_xlim(left=0)
-        axes.set_xlabel("effect over noise [1]")
-        axes.plot([], [], "o", ms=6, color=RIGHT, label="named rightly")
-        axes.plot(
-            [], [], "o", ms=6, mfc="white", mec=WRONG, mew=1.4, label="not; height: probability given to the truth"
-        )
-        figure.legend(loc="outside lower center", ncols=2)
+                axes.plot(
+                    p["snr"], p["probability"] or 0.0, "o", ms=5, mfc=color if p["right"] else "white", mec=color,
+                    mew=1.3, clip_on=False,
+                )  # fmt: skip
+            axes.axvline(3.0, color=MUTED, lw=0.9, ls=":")
+            axes.set_title(row["term"].replace("_", " "), fontsize=8.5, color=INK, loc="left")
+            axes.set_ylim(-0.02, 1.02)
+            axes.set_xlim(0, 6)
+        for axes in panels[len(rows) - across : len(rows)]:
+            axes.tick_params(labelbottom=True)
+            axes.set_xlabel("effect over noise [1]")
+        first = panels[0]
+        first.plot([], [], color=RECONSTRUCTION, label="probability of the right name, 95 % band")
+        first.plot([], [], "o", ms=5, color=RIGHT, mew=1.3, label="a case named rightly")
+        first.plot([], [], "o", ms=5, mfc="white", mec=WRONG, mew=1.3, label="a case that was not")
+        figure.legend(loc="outside lower center", ncols=3)
         return address(figure)
 
 
