@@ -57,6 +57,17 @@ class Case:
         """What any smooth residual could gain."""
         return flexible(self.clip, self.whiten, self.space, self.nulls)
 
+    @cached_property
+    def strain(self) -> float:
+        """Squares of the nuisances at their most likely values, over what all but 5 % of the nulls stay below [1]."""
+        own, nulls = (self.space.likely(v) for v in (self.z, self.nulls))
+        return float((own**2).sum() / np.quantile((nulls**2).sum(0), 0.95))
+
+    @property
+    def strained(self) -> bool:
+        """Whether camera, grips, base and the simulator's own error would have to be larger than they ever are."""
+        return self.settings.calibrated and self.strain > calibration.STRAINED
+
     @property
     def workers(self) -> int:
         """Runs side by side."""
@@ -73,7 +84,7 @@ def diagnose(
     findings = search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.4 * s, 1, text))
     laws = by_law(findings)
     bend = case.flexible.fit(case.z)
-    detected = max(entry[0] for entry in laws.values()) > threshold(laws, settings)
+    detected = case.strained or max(entry[0] for entry in laws.values()) > threshold(laws, settings)
     if detected:
         parts = costly(clip, case.base, memo, case.workers)
         findings += search(case, case.z, case.nulls, lambda s, text: progress(0.62, 1, text), parts)

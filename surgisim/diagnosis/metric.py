@@ -31,9 +31,13 @@ class Metric:
         """(1 + U U^T)^-1 of vectors (N, C), float32: their plain products with others are those of `gram`."""
         return vectors.astype(np.float32) - self.explained(vectors)
 
+    def likely(self, vectors: np.ndarray) -> np.ndarray:
+        """Most likely values of the directions for vectors (N,) or (N, C), in prior standard deviations, (M, ...)."""
+        return cho_solve(self.factor, self.seen_through(vectors))
+
     def explained(self, vector: np.ndarray) -> np.ndarray:
         """The part of vectors (N,) or (N, C) that the directions take: nuisances at their most likely values."""
-        return self.columns @ cho_solve(self.factor, self.seen_through(vector)).astype(np.float32)
+        return self.columns @ self.likely(vector).astype(np.float32)
 
     def draw(self, rng: np.random.Generator, count: int, project) -> np.ndarray:
         """Residuals of nothing but noise and nuisance, (N, count); `project` takes out each point's constant."""

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_solve
 
 from surgisim.diagnosis import calibration
 from surgisim.diagnosis.base import SPREAD, START, bounded
@@ -99,7 +98,7 @@ def refined(
     def cost(x: np.ndarray, r: np.ndarray | None) -> float:
         return np.inf if r is None else float(space.gram(r[:, None], r[:, None])[0, 0] + x @ x)
 
-    likely = cho_solve(case.space.factor, case.space.seen_through(z - whiten(response[:, :until])))[case.slopes]
+    likely = case.space.likely(z - whiten(response[:, :until]))[case.slopes]
     usual = (np.array([START[0], base.x[1], START[2]]) - base.x) / SPREAD
     bases = [0 * usual, np.clip(likely, -2, 2), usual]
     if base_at is not None:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_solve
 
 from surgisim.diagnosis import calibration
 from surgisim.diagnosis.base import SPREAD, Base, bounded, carried, simulate
@@ -114,7 +113,7 @@ def _freed(case, refits: list, say) -> list[Together]:
 def _moved(case, refits: list) -> list[Together]:
     clip, base, until, first = case.clip, case.base, case.clip.until, refits[0].x
     left = case.z - sum(case.whiten(r.response[:, :until]) for r in refits)
-    likely = cho_solve(case.space.factor, case.space.seen_through(left))[case.slopes]
+    likely = case.space.likely(left)[case.slopes]
     x = bounded((base.x if first is None else first) + likely * SPREAD, clip)
     try:
         moved = based(case, x)

@@ -68,13 +68,16 @@ def judged(case, laws, refits, fitted: Together, bend, over_placebo: float | Non
         "outward": max((out for out, _ in pushes(case.clip.recording, accepted)), default=None),
         "over_placebo": over_placebo,
     }
-    if case.settings.calibrated and faint(first.log_evidence, shares):
+    if case.settings.calibrated and not case.strained and faint(first.log_evidence, shares):
         return nothing(case, laws, shares)
     explained = max(shares["gained"], shares["taken"])
     verdict = "named"
     if doubtful(first.term, shares):
         verdict, explained = "unexplained", min(explained, 1 - shares["left"])
-    elif explained < calibration.EXPLAINED or first.log_evidence < calibration.THRESHOLD:
+    elif first.log_evidence < calibration.THRESHOLD:
+        # Small patterns that it gains say nothing: what it takes off the error does.
+        verdict, explained = "unexplained", shares["taken"]
+    elif explained < calibration.EXPLAINED:
         verdict = "unexplained"
     elif alike and chances[first.term] < calibration.SURE:
         verdict = "equivalence class"
@@ -161,6 +164,7 @@ def write(
             "log_evidence": float(laws[ranked[0]][0]),
             "nulls": np.round(np.max([n for _, n, _ in laws.values()], 0), 3).tolist(),
             "explainable": float(explainable(bend)),
+            "strain": case.strain,
             **said_of.shares,
             "spacing": {"value": float(1e3 * shown.clip.body.spacing), "unit": "mm"},
             "beside": None if fitted is None or fitted.beside is None else _beside(case, bend, fitted.beside),

@@ -1,10 +1,13 @@
 """Plant a law, and the diagnosis names it; plant nothing, and it names nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from planted import GRID, recording
 
 from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis import calibration
 from surgisim.diagnosis import verdict as judging
 from surgisim.diagnosis.calibration import CLEAR, THRESHOLD
 from surgisim.diagnosis.clip import clip_of
@@ -71,6 +74,23 @@ def test_a_tie_with_a_placebo_is_no_defeat():
     assert not judging.doubtful("gravity", {**shares, "over_placebo": None})
     assert not judging.doubtful("gravity", {**shares, "over_placebo": -0.9e-5})
     assert judging.doubtful("gravity", {**shares, "over_placebo": -1.1e-5})
+
+
+def test_nuisances_larger_than_they_ever_are_are_something_hidden(nothing, plain, monkeypatch):
+    found, *_ = plain
+    assert found.global_test["strain"] < 1.0
+    case = prepare_case(clip_of(recording(), share=GRID), SETTINGS, Memo(nothing, ""), lambda *_: None)
+    assert case.strain == pytest.approx(found.global_test["strain"])
+    columns = case.space.columns
+    for size, strained in ((1.0, False), (3.0, True)):
+        values = size * np.random.default_rng(0).standard_normal(columns.shape[1])
+        pushed = replace(case, z=case.z + columns @ values)
+        assert pushed.strained == strained
+        assert not replace(pushed, settings=SETTINGS.model_copy(update={"calibrated": False})).strained
+    monkeypatch.setattr(calibration, "STRAINED", 0.0)
+    said, physics, _ = verdict(nothing)
+    assert (said.verdict, set(physics.terms)) == ("unexplained", {"neo_hookean_ciarlet", "newtonian"})
+    assert said.unexplained_fraction > 0.8
 
 
 def test_nothing_planted_is_nothing_named(plain):
