@@ -103,7 +103,7 @@ def laws(found: dict[str, Any]) -> str | None:
             axes.axvline(3.0, color=MUTED, lw=0.9, ls=":")
             axes.set_title(row["term"].replace("_", " "), fontsize=8.5, color=INK, loc="left")
             axes.set_ylim(-0.02, 1.02)
-            axes.set_xlim(0, 6)
+            axes.set_xlim(0, max(6.0, *(p["snr"] for p in found["points"])))
         for axes in panels[len(rows) - across : len(rows)]:
             axes.tick_params(labelbottom=True)
             axes.set_xlabel("effect over noise [1]")
