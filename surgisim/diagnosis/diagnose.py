@@ -78,16 +78,21 @@ def diagnose(
     recording: Recording, settings: Diagnosing, progress: Progress, memo: Memo
 ) -> tuple[Diagnosis, Physics, Mismatch]:
     """What the recording's simulation lacks. Raises Problem where the recording cannot be used."""
-    clip = clip_of(recording, share=settings.grid, device=settings.device)
-    progress(0.01, 1, f"noise of {len(clip.kept)} points on {clip.until} frames")
-    case = prepare_case(clip, settings, memo, progress)
-    findings = search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.4 * s, 1, text))
+    case, findings = first_look(recording, settings, memo, progress)
+    if hazy(case, by_law(findings)) and settings.replay < settings.grid:
+        finer = settings.model_copy(update={"grid": settings.replay})
+
+        def again(share: float, whole: float, text: str) -> None:
+            progress(max(share, 0.64), whole, f"{text}, on a finer grid")
+
+        case, findings = first_look(recording, finer, memo.on(finer.grid), again)
+    clip, settings, memo = case.clip, case.settings, case.memo
     laws = by_law(findings)
     bend = case.flexible.fit(case.z)
     detected = case.strained or max(entry[0] for entry in laws.values()) > threshold(laws, settings)
     if detected:
         parts = costly(clip, case.base, memo, case.workers)
-        findings += search(case, case.z, case.nulls, lambda s, text: progress(0.62, 1, text), parts)
+        findings += search(case, case.z, case.nulls, lambda s, text: progress(0.64, 1, text), parts)
         laws = by_law(findings)
     ranked, refits = sorted(laws, key=lambda term: -laws[term][0]), []
     if detected:
@@ -129,6 +134,25 @@ def compete(case: Case, laws: dict, ranked: list[str], progress: Progress) -> tu
 def workers(clip: Clip, settings: Diagnosing) -> int:
     """Runs side by side."""
     return settings.workers if clip.device == "cpu" else ON_A_GPU
+
+
+def first_look(
+    recording: Recording, settings: Diagnosing, memo: Memo, progress: Progress
+) -> tuple[Case, list[Finding]]:
+    """Noise, base, nuisances, and all that is cheap to try. Raises Problem where the recording cannot be used."""
+    clip = clip_of(recording, share=settings.grid, device=settings.device)
+    progress(0.01, 1, f"noise of {len(clip.kept)} points on {clip.until} frames")
+    case = prepare_case(clip, settings, memo, progress)
+    return case, search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.39 * s, 1, text))
+
+
+def hazy(case: Case, laws: dict) -> bool:
+    """Whether something is hidden for certain and no law says clearly what.
+
+    What is hidden close to a grip, where tissue tears, is steeper than a coarse grid can show: there nothing fits well,
+    and how firmly the grip carries makes up for it.
+    """
+    return case.strained and max(entry[0] for entry in laws.values()) < calibration.CLEAR
 
 
 def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress) -> Case:

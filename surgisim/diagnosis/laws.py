@@ -185,15 +185,20 @@ def _push(force: np.ndarray, onset: float, end: float) -> dict[str, float]:
 
 
 def _breath(parts: np.ndarray, rate: float) -> dict[str, float]:
-    """From sine and cosine of two harmonics along three axes, (4, 3), to one direction."""
+    """From sine and cosine of two harmonics along three axes, (4, 3), to one direction.
+
+    What has a larger second harmonic than its first breathes twice as fast, without one.
+    """
     scaled = parts * np.array([1.0, 1.0, 0.5, 0.5])[:, None]
     left, size, right = np.linalg.svd(scaled, full_matrices=False)
     s, c, s2, c2 = left[:, 0] * size[0]
+    if math.hypot(s2, c2) > math.hypot(s, c):
+        s, c, s2, c2, rate = s2, c2, 0.0, 0.0, 2 * rate
     first, second = math.hypot(s, c), math.hypot(s2, c2)
     yaw, pitch = angles(right[0])
     return {
         "amplitude": max(first, 1e-9), "period": 1 / rate, "phase": math.atan2(c, s),
-        "second": min(second / max(first, 1e-9), 1.0), "second_phase": math.atan2(c2, s2), "yaw": yaw, "pitch": pitch,
+        "second": second / max(first, 1e-9), "second_phase": math.atan2(c2, s2), "yaw": yaw, "pitch": pitch,
     }  # fmt: skip
 
 

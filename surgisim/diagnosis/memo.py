@@ -4,7 +4,7 @@ import hashlib
 import io
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -22,6 +22,10 @@ class Memo:
     """What all entries depend on: digests of recording, settings and code."""
     making: dict[str, Lock] = field(default_factory=dict, repr=False, compare=False)
     """Of each entry: a thread that wants what another one is making waits for it."""
+
+    def on(self, grid: float) -> "Memo":
+        """The same folder for runs on a grid of another spacing, over the cube root of the body's volume."""
+        return replace(self, about=f"{self.about} {grid}")
 
     def __call__(self, what: Any, make: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
         """The arrays made for `what` (JSON-able), from the folder if they are there."""

@@ -36,7 +36,7 @@ def replayed(case, named: Together, placebo: Together | None) -> Replay | None:
     if share >= case.settings.grid:
         return None
     clip = replace(case.clip, body=clip_of(case.clip.recording, share=share, device=case.clip.device).body)
-    memo = replace(case.memo, about=f"{case.memo.about} {share}")
+    memo = case.memo.on(share)
 
     def bare(x: np.ndarray) -> np.ndarray:
         prepared = clip.prepared(case.base.prepared.terms)

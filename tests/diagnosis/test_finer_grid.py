@@ -1,14 +1,16 @@
 """What is shown comes from a finer grid, with the numbers of the search."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from planted import GRID, recording
 
 from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis import calibration
 from surgisim.diagnosis.clip import clip_of
-from surgisim.diagnosis.diagnose import prepare_case
+from surgisim.diagnosis.diagnose import diagnose, hazy, prepare_case
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import law_of, respond
@@ -53,3 +55,28 @@ def test_a_replay_is_the_engines_on_the_finer_grid(case, named):
 
 def test_no_replay_on_a_grid_that_is_not_finer(case, named):
     assert replayed(replace(case, settings=Diagnosing(grid=GRID, replay=GRID)), named, None) is None
+
+
+def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_finer_grid(tmp_path, monkeypatch):
+    plain = Diagnosing(grid=GRID, replay=0.21, nulls=8, experiment=False, free=0, second=False)
+    made, said = recording(), []
+
+    def spacing(**settings):
+        chosen = plain.model_copy(update=settings)
+        found, *_ = diagnose(made, chosen, lambda share, _, text: said.append((share, text)), Memo(tmp_path, ""))
+        return 1e-3 * found.global_test["spacing"]["value"]
+
+    coarse, fine = (clip_of(made, share=share).body.spacing for share in (GRID, 0.21))
+    monkeypatch.setattr(calibration, "STRAINED", 0.0)
+    # A replay's grid that is no finer is none to look at again.
+    assert spacing(replay=GRID) == pytest.approx(coarse)
+    said.clear()
+    assert spacing() == pytest.approx(fine)
+    shares = [share for share, _ in said]
+    assert shares == sorted(shares)
+    assert sum(text.endswith("on a finer grid") for _, text in said) > 10
+
+
+@pytest.mark.parametrize(("evidence", "strained", "wanted"), [(49, True, True), (51, True, False), (49, False, False)])
+def test_a_law_that_is_clear_needs_no_finer_grid(evidence, strained, wanted):
+    assert hazy(SimpleNamespace(strained=strained), {"gravity": (evidence,), "tether": (3.0,)}) == wanted

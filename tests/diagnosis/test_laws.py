@@ -56,3 +56,18 @@ def test_two_laws_are_joined_unless_a_body_would_need_one_twice(clip):
     assert both.places == {"hidden_contact": here}
     with pytest.raises(Clash):
         joined([weight, push])
+
+
+@pytest.mark.parametrize(("second", "times"), [(0.4, 1), (3.0, 2)])
+def test_breath_with_a_larger_second_harmonic_is_one_twice_as_fast(clip, second, times):
+    # Sine and cosine of each harmonic along x; the search counts the second by halves.
+    parts = np.zeros((4, 3))
+    parts[:, 0] = 6e-4, 8e-4, 2 * second * 8e-4, 2 * second * -6e-4
+    numbers = law_of(Hypothesis("respiration", np.eye(12), 0, None, None, None, {"rate": 0.3}), parts.ravel(), clip)
+    breath = numbers.values["respiration"]
+    assert breath["period"] == pytest.approx(1 / (0.3 * times))
+    assert breath["amplitude"] == pytest.approx(1e-3 * (second if times == 2 else 1))
+    assert breath["second"] == pytest.approx(0.0 if times == 2 else second)
+    waves = breath["amplitude"] * np.array([np.sin(breath["phase"]), np.cos(breath["phase"])])
+    along = np.sign(np.sin(breath["yaw"])) or 1.0
+    assert along * waves == pytest.approx([second * -6e-4, second * 8e-4] if times == 2 else [8e-4, 6e-4])
