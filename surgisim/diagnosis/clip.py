@@ -137,9 +137,11 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
     usable &= recording.visible[:, :until].mean(1) > LEAST_SEEN
     kept = np.flatnonzero(usable)
     if len(kept) < 4:
+        away = float(np.median(near))
+        apart = f" Half of them begin {away:.2g} m or more from it: are they in its unit?" if away > spacing else ""
         raise Problem(
             f"recording {recording.name}: {len(kept)} of {len(rest)} points lie on the body, outside the grips, and "
-            "are seen often enough; at least 4 are needed to tell what was left out."
+            f"are seen often enough; at least 4 are needed to tell what was left out.{apart}"
         )
     if until < 8:
         raise Problem(

@@ -95,4 +95,9 @@ def _held(rest: np.ndarray, pitch: np.ndarray, boxes: np.ndarray, low, high) -> 
                 "Give boxes in the metres of rest.ply."
             )
         held |= mine
+    if held.all():
+        raise Problem(
+            f"fixed.json: its boxes hold the whole body, which reaches from {np.round(low, 4).tolist()} to "
+            f"{np.round(high, 4).tolist()} m, and nothing could move. Give boxes that cover only what is held."
+        )
     return held

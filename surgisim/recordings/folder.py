@@ -28,6 +28,8 @@ from surgisim.recordings.recording import Recording, no_grips
 
 FORMAT = "surgisim-recording/1"
 NAME = "recording.json"
+LEAST, MOST = 1e-3, 10.0
+"""Length of a body [m]: beyond, its unit is another one."""
 
 
 def is_recording(path: Path) -> bool:
@@ -41,6 +43,12 @@ def read_recording(folder: Path) -> Recording:
     unit, frames = told["unit"], told["frames"]
     shape = read_mesh(_there(folder / "rest.ply"))
     mesh = closed(Mesh(shape.vertices * unit, shape.faces), str(folder / "rest.ply"))
+    long = float(np.ptp(mesh.vertices, axis=0).max())
+    if not LEAST < long < MOST:
+        raise Problem(
+            f"{folder / 'rest.ply'}: the body is {long:.3g} m long, but between {LEAST:g} and {MOST:g} m are wanted. "
+            "Mend 'length_unit' in recording.json, which every file is in, or the mesh."
+        )
     tracks = arrays(
         _there(folder / "tracks.npz"),
         {"points": "KT3", "visible": "KT", "sigma": "K", "place": "K3"},

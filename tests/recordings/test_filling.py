@@ -130,6 +130,11 @@ def test_a_box_beside_the_body_is_refused():
         fill(closed(box(), "box"), spacing=SPACING, boxes=np.array([[[1.0, 1, 1], [2, 2, 2]]]))
 
 
+def test_boxes_around_the_whole_body_are_refused():
+    with pytest.raises(Problem, match="its boxes hold the whole body"):
+        fill(closed(box(), "box"), spacing=SPACING, boxes=np.array([[[-1.0, -1, -1], [1, 1, 1]]]))
+
+
 def test_a_binary_stl_is_read_in_its_unit(tmp_path):
     mesh = box((40.0, 30.0, 20.0))
     record = np.zeros(12, [("n", "<f4", 3), ("c", "<f4", (3, 3)), ("a", "<u2")])
