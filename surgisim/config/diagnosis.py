@@ -15,7 +15,8 @@ class Diagnosing(Settings):
     grid: float = Field(0.165, gt=0.04, le=0.5)
     """Spacing of the grid over the cube root of the body's volume [1]."""
     replay: float = Field(0.13, gt=0.04, le=0.5)
-    """The same of the runs whose errors are shown, before and after; none is made where it is no finer [1]."""
+    """The same of the runs whose errors are shown, before and after, and of a second search where the first sees that
+    something is hidden and not what; neither is made where it is no finer [1]."""
     nulls: int = Field(24, ge=4, le=400)
     """Residuals of nothing but noise that go through the same search [1]."""
     refine: int = Field(4, ge=1, le=16)
