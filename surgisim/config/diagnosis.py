@@ -1,10 +1,17 @@
 """Settings of a diagnosis."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from surgisim.config.base import Settings
+
+
+Kinds = Literal[
+    "release", "held", "lag", "scale", "drift", "simulator", "grip radius", "grip centre", "grip firmness", "grip path",
+    "elastic law",
+]  # fmt: skip
+"""What a recording leaves open, by name."""
 
 
 class Diagnosing(Settings):
@@ -32,8 +39,10 @@ class Diagnosing(Settings):
     """How tracking errors are taken to be related [-]."""
     offsets: bool = True
     """Whether every point may have a constant error of its own [1]."""
+    without: Annotated[list[Kinds], Field(max_length=16)] = []
+    """Kinds of nuisances that are left out, to see what each is worth [name]."""
     model_error: float = Field(1.0, ge=0, le=10)
-    """Times the measured error of the simulator [1]."""
+    """Times the simulator's error as a finer grid shows it [1]."""
     cause: Literal["searched", "symptom"] = "searched"
     """Where local laws are tried: everywhere, or where the misfit is largest [-]."""
     calibrated: bool = True

@@ -6,12 +6,13 @@ last run, E and eta through short runs that begin just before the first release;
 released, through whole runs.
 """
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.clip import OPENS, Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Whitener
@@ -21,29 +22,41 @@ from surgisim.mpm.closing import follow
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Breakdown, Run
+from surgisim.problem import Problem
 
 TERMS = ("neo_hookean_ciarlet", "newtonian")
-START = np.array([np.log(3e3), 0.45, np.log(3e-3)])
-"""log E [Pa], nu, log eta / E [s]."""
-SPREAD = np.array([0.8, 0.03, 0.8])
-LOW, HIGH = np.array([np.log(5e2), 0.30, np.log(3e-4)]), np.array([np.log(5e5), 0.485, np.log(3e-2)])
+START = np.array([np.log(5e3), 0.45, np.log(2e-3)])
+"""log E [Pa], nu, log eta / E [s]: soft tissue and silicone gels lie between 1 and 50 kPa and .3 and 20 ms."""
+SPREAD = np.array([1.2, 0.03, 1.4])
+LOW, HIGH = np.array([np.log(2e2), 0.30, np.log(5e-5)]), np.array([np.log(1e6), 0.49, np.log(5e-2)])
 STEP = np.array([0.2, 0.01, 0.3])
+NAMES = ("E", "nu", "eta / E")
+HELD = 1e-3
+"""Standard deviation of where what is held ends [m]: nobody glues to the millimetre."""
+LATE = 0.5
+"""Standard deviation of the moment of a release about the middle of the interval in which it falls [frames]; one that
+is the same everywhere in it has .29, and whoever marks frames may be a frame off."""
+EARLIEST, LATEST = -1.4, 2.4
+"""Of a release after a grip's last active frame that is tried [frames]."""
 SLOWER = 8
 """Times that viscosity may shorten the stable step of tissue of the usual stiffness (`mpm/stable.py`). To a base
 without memory, tissue that relaxes looks viscous without bound, and its runs would take minutes each."""
-SCAN = (-1.0, -0.35, 0.3, 1.0)
-"""Where the descent may start, in logarithms of E and of eta / E away from START."""
+STIFFNESSES, LAGS = (-1.2, -0.4, 0.4, 1.2), tuple(np.log(np.array([1e-4, 5e-4, 2e-3, 8e-3, 2.5e-2])) - START[2])
+"""Where a descent may start, in logarithms of E and of eta / E away from START: a ring-down misfits by whole periods,
+and one that is faster than the frames looks like a slower one."""
+DESCENTS_FROM = 3
+"""Of those, from how many a descent starts."""
 STIFFER = np.log(3.0)
 """Step of log E where the body to begin with is torn apart."""
-DESCENTS = 8
-"""Steps of it at most."""
+DESCENTS, HOPE = 8, 4.0
+"""Steps of it at most, and how many more like its last one it is given to become the best."""
 SAFETY, BOLD = 0.8, 1.2
 """Share of the largest step that is guarded (`mpm/stable.py`) that a law's simulation takes, and that a diagnosis' runs
 try first: tracks then differ by some micrometres, and runs break down only from 1.6 on. One that does is run again with
 SAFETY."""
-SOFTER, ALIKE = 0.7, 2.0
-"""How much softer, in log E, another descent begins, and what chi square its end may cost more. Tissue that creeps back
-tells eta / E alone: of bodies that look alike the softest takes the longest steps."""
+ALIKE = 2.0
+"""What chi square a softer body may cost more. Tissue that creeps back tells eta / E alone: of bodies that look alike
+the softest takes the longest steps."""
 ROUNDS, AGAIN = 3, 25.0
 """Fits at most, and what chi square a run may cost beyond what the last one promised; chosen: 3 where it went well."""
 AFTER = 0.5
@@ -64,6 +77,8 @@ class Base:
     """Of the points by x, at one prior standard deviation [m], (3, K, T_fit, 3)."""
     spread: np.ndarray
     """Posterior standard deviation of x, (3,)."""
+    bound: tuple[str, ...] = ()
+    """Numbers that came to the end of what is tried: the recording does not tell them."""
 
     @property
     def values(self) -> Values:
@@ -72,55 +87,118 @@ class Base:
 
 def values_of(x: np.ndarray) -> Values:
     E, nu = float(np.exp(x[0])), float(x[1])
-    return {TERMS[0]: {"E": E, "nu": min(nu, 0.485)}, TERMS[1]: {"eta": E * float(np.exp(x[2]))}}
+    return {TERMS[0]: {"E": E, "nu": nu}, TERMS[1]: {"eta": E * float(np.exp(x[2]))}}
 
 
 def bounded(x: np.ndarray, clip: Clip) -> np.ndarray:
     """The nearest numbers that are tried, (3,)."""
     x = np.clip(x, LOW, HIGH)
+    return np.array([x[0], x[1], min(x[2], longest_lag(x[0], clip))])
+
+
+def longest_lag(log_E: float, clip: Clip) -> float:
+    """log eta / E beyond which steps would be too short."""
     E, nu, rho, dx = np.exp(START[0]), START[1], clip.density, clip.body.spacing
     elastic = dx / 2 / np.sqrt(E * (1 - nu) / (1 + nu) / (1 - 2 * nu) / rho)
     most = rho * dx**2 / 5 / (elastic / SLOWER)
-    return np.array([x[0], x[1], min(x[2], np.log(most) - x[0])])
+    return float(np.log(most) - log_E)
 
 
 def fit_base(
-    clip: Clip, whiten: Whitener, nuisances: np.ndarray, memo: Memo, *, rounds: int = ROUNDS, workers: int = 1,
-    say: Callable[[str], None] = lambda text: None,
-) -> Base:  # fmt: skip
-    """Least squares over E, nu and eta, given nuisances whitened at one standard deviation, (N, M).
+    clip: Clip, whiten: Whitener, nuisances: Callable[[Clip, np.ndarray, np.ndarray], np.ndarray], memo: Memo, *,
+    rounds: int = ROUNDS, workers: int = 1, timing: bool = True, say: Callable[[str], None] = lambda text: None,
+) -> tuple[Clip, Base]:  # fmt: skip
+    """E, nu and eta, where what is held ends, and when grips open; the clip with the last two, and the base.
 
-    Begun anew, at most `rounds` times, where a run fits worse than the tangent and the short runs before it promised.
+    nuisances: of a clip, a base's numbers (3,) and its tracks [m], (K, T, 3), whatever else a residual may hold,
+    whitened at one standard deviation, (N, M). Begun anew, at most `rounds` times, where a run fits worse than the
+    tangent and the short runs before it promised. timing: whether the moments of releases are free.
     """
-    x, promised = START.copy(), np.inf
-    bodies = [clip.prepared(TERMS) for _ in range(workers)]
-    prepared = bodies[0]
-    carry = prepared.simulator.carry(clip.rest)
-    space = metric(nuisances)
+    releases = clip.releases() if timing else []
+    y, promised = np.concatenate([START, [0.0], np.full(len(releases), OPENS)]), np.inf
+    space = None
     for n in range(rounds + 1):
-        say(f"base, run {n + 1}: E {np.exp(x[0]):.0f} Pa, nu {x[1]:.3f}, eta {np.exp(x[0] + x[2]):.2f} Pa s")
+        clip = set_to(clip, y, releases)
+        bodies = [clip.prepared(TERMS) for _ in range(workers)]
+        prepared = bodies[0]
+        carry = prepared.simulator.carry(clip.rest)
+        say(f"base, run {n + 1}: {told(y, releases)}")
         if n == 0:
-            x, (drive, run) = _standing(prepared, clip, x, memo, clip.until)
+            y[:3], (drive, run) = _standing(prepared, clip, y[:3], memo, clip.frames)
         else:
-            drive, run = simulate(prepared, clip, x, memo, clip.frames)
+            drive, run = simulate(prepared, clip, y[:3], memo, clip.frames)
         simulated = carried(carry, run)
-        near = tangent(prepared, values_of(x), drive, run, clip.rest, clip.until)
+        near = tangent(prepared, values_of(y[:3]), drive, run, clip.rest, clip.until)
+        if space is None or n == 1:
+            space = metric(nuisances(clip, y[:3], simulated))
         around = _Around(
-            clip, whiten, space, memo, bodies, carry, x, run, simulated[:, : clip.until],
-            _by_poisson(prepared, near, x),
+            clip, whiten, space, memo, bodies, carry, y.copy(), run, simulated[:, : clip.until],
+            _by_poisson(prepared, near, y[:3]), by_held(clip, y[:3], simulated, memo)[:, : clip.until], releases,
         )  # fmt: skip
-        if n > 0 and (n == rounds or around.cost(x, around.left(x)) < promised + AGAIN):
+        if n > 0 and (n == rounds or around.cost(y, around.left(y)) < promised + AGAIN):
             break
-        x = around.softest(say) if n == 0 else around.descend(x, say)
-        promised = around.cost(x, around.left(x))
-    slopes = around.slopes(x)
-    spread = np.sqrt(np.diag(np.linalg.inv(around.normal(slopes))))
-    return Base(x, prepared, drive, run, simulated, near, slopes * SPREAD[:, None, None, None], spread)
+        y = around.best(say) if n == 0 else around.descend(y, say)
+        promised = around.cost(y, around.left(y))
+    slopes = around.slopes(y)
+    spread = np.sqrt(np.diag(np.linalg.inv(around.normal(slopes))))[:3]
+    x = y[:3]
+    ends = ((x - LOW < 0.02 * SPREAD) | (HIGH - x < 0.02 * SPREAD)) | (np.arange(3) == 2) * (
+        longest_lag(x[0], clip) - x[2] < 0.02
+    )
+    bound = tuple(name for name, end in zip(NAMES, ends, strict=True) if end)
+    return clip, Base(x, prepared, drive, run, simulated, near, slopes[:3] * SPREAD[:, None, None, None], spread, bound)
+
+
+def set_to(clip: Clip, y: np.ndarray, releases: list[tuple[int, int]]) -> Clip:
+    """The clip held and let go as y says, (4 + R,)."""
+    late = clip.opening.copy()
+    for (j, t), after in zip(releases, y[4:], strict=True):
+        late[j, t] = after
+    # Later releases, of which nothing is fitted, are taken to fall as those that are.
+    if len(releases):
+        shown = np.zeros(late.shape, bool)
+        shown[tuple(np.array(releases).T)] = True
+        late[~shown] = y[4:].mean()
+    clip = replace(clip, late=late)
+    return clip if abs(y[3] - clip.raised) < 1e-6 else clip.laid(raised=float(y[3]))
+
+
+def told(y: np.ndarray, releases: list) -> str:
+    opens = f", opens {' and '.join(f'{late:.2f}' for late in y[4:])} frames late" if releases else ""
+    return (
+        f"E {np.exp(y[0]):.0f} Pa, nu {y[1]:.3f}, eta {np.exp(y[0] + y[2]):.2f} Pa s, held {1e3 * y[3]:+.1f} mm{opens}"
+    )
+
+
+def by_held(clip: Clip, x: np.ndarray, simulated: np.ndarray, memo: Memo) -> np.ndarray:
+    """Derivative of the points' displacement by where what is held ends [1], (K, T, 3), by the engine."""
+    for by in (HELD, -HELD) if clip.body.held.any() else ():
+        try:
+            moved = tracks_of(clip.laid(raised=clip.raised + by), x, memo)
+        except (Breakdown, Problem):
+            # Nothing free, or nothing held, is left there.
+            continue
+        return (moved - simulated) / by
+    return np.zeros_like(simulated)
+
+
+def tracks_of(clip: Clip, x: np.ndarray, memo: Memo, terms: tuple[str, str] = TERMS) -> np.ndarray:
+    """Displacement of the points over the whole clip [m], (K, T, 3), with E, nu and eta of x."""
+    prepared = clip.prepared(terms)
+    values = dict(zip(terms, values_of(x).values(), strict=True))
+
+    def make() -> dict[str, np.ndarray]:
+        run = _run(prepared, clip, values, last=clip.frames - 1)
+        return {"seen": carried(prepared.simulator.carry(clip.rest), run)}
+
+    motion = [clip.motion.radius.tolist(), clip.motion.center_rest.tolist(), np.round(clip.motion.position, 9).tolist()]
+    return memo(["tracks", terms, x.tolist(), *motion, *clip.kind], make)["seen"]
 
 
 @dataclass(frozen=True)
 class _Around:
-    """Tracks near a run at `x`: nu moves them along its slope, E and eta by short runs from the run's own states."""
+    """Tracks near a run at `x`: nu and what is held move them along their slopes; E, eta and moments of release by
+    short runs from the run's own states."""
 
     clip: Clip
     whiten: Whitener
@@ -130,21 +208,41 @@ class _Around:
     """One for each short run at a time."""
     carry: object
     x: np.ndarray
+    """(4 + R,)"""
     run: Run
     simulated: np.ndarray
     by_poisson: np.ndarray
+    by_held: np.ndarray
+    releases: list[tuple[int, int]]
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Of the prior, (4 + R,)."""
+        return np.concatenate([START, [0.0], np.full(len(self.releases), OPENS)])
+
+    @property
+    def reach(self) -> np.ndarray:
+        """Its standard deviation, (4 + R,)."""
+        return np.concatenate([SPREAD, [HELD], np.full(len(self.releases), LATE)])
+
+    def bounded(self, y: np.ndarray) -> np.ndarray:
+        return np.concatenate(
+            [bounded(y[:3], self.clip), np.clip(y[3:4], -4 * HELD, 4 * HELD), np.clip(y[4:], EARLIEST, LATEST)]
+        )
 
     def tracks(self, y: np.ndarray, body: int = 0) -> np.ndarray:
         """Displacement of the points [m], (K, T_fit, 3)."""
-        first, last = _window(self.clip)
         rates = np.array([y[0], self.x[1], y[2]])
-        what = ["short", self.x.tolist(), rates.tolist(), first, last]
-        seen = self.memo(
-            what, lambda: {"seen": _short(self.clip, self.bodies[body], rates, self.run, self.carry, first, last)}
-        )["seen"]
+        clip = set_to(self.clip, np.concatenate([rates, self.x[3:4], y[4:]]), self.releases)
         result = self.simulated.copy()
-        result[:, first + 1 : last + 1] = seen
-        return result + (y[1] - self.x[1]) * self.by_poisson
+        for first, last in _windows(self.clip):
+            what = ["short", self.x.tolist(), rates.tolist(), first, last, *clip.kind]
+            seen = self.memo(
+                what,
+                lambda f=first, t=last: {"seen": _short(clip, self.bodies[body], rates, self.run, self.carry, f, t)},
+            )["seen"]
+            result[:, first + 1 : last + 1] = seen
+        return result + (y[1] - self.x[1]) * self.by_poisson + (y[3] - self.x[3]) * self.by_held
 
     def left(self, y: np.ndarray, body: int = 0) -> np.ndarray | None:
         """Whitened residual, (N,); None where tissue like that is torn apart."""
@@ -156,46 +254,60 @@ class _Around:
     def cost(self, y: np.ndarray, left: np.ndarray | None) -> float:
         if left is None:
             return np.inf
-        return float(self.space.gram(left[:, None], left[:, None])[0, 0] + (((y - START) / SPREAD) ** 2).sum())
+        prior = (((y - self.middle) / self.reach) ** 2).sum()
+        return float(self.space.gram(left[:, None], left[:, None])[0, 0] + prior)
 
     def slopes(self, y: np.ndarray) -> np.ndarray:
-        """Derivative of the points' displacement by y [m], (3, K, T_fit, 3)."""
-        aside = np.diag(STEP)
-        middle, stiffer, slower = at_once(self.tracks, [y, y + aside[0], y + aside[2]], len(self.bodies))
-        return np.stack([(stiffer - middle) / STEP[0], self.by_poisson, (slower - middle) / STEP[2]])
+        """Derivative of the points' displacement by y [m], (4 + R, K, T_fit, 3)."""
+        late = np.where(y[4:] > LATEST - 0.3, -0.2, 0.2)
+        aside = np.concatenate([[STEP[0]], [STEP[2]], late])
+        ways = np.eye(len(y))[[0, 2, *range(4, len(y))]]
+        middle, *moved = at_once(
+            self.tracks, [y, *(y + a * e for a, e in zip(aside, ways, strict=True))], len(self.bodies)
+        )
+        stiffer, slower, *later = ((m - middle) / a for m, a in zip(moved, aside, strict=True))
+        return np.stack([stiffer, self.by_poisson, slower, self.by_held, *later])
 
     def normal(self, slopes: np.ndarray) -> np.ndarray:
         J = self.whiten(slopes).T
-        return self.space.gram(J, J) + np.diag(1 / SPREAD**2)
+        return self.space.gram(J, J) + np.diag(1 / self.reach**2)
 
     def starts(self) -> list[np.ndarray]:
-        """A few stiffnesses and viscosities, best first: a ring-down misfits by whole periods."""
-        tries = [self.x, *(bounded(self.x + np.array([e, 0.0, lag]), self.clip) for e in SCAN for lag in SCAN)]
+        """A few stiffnesses and viscosities, best first."""
+        tries = [self.x]
+        for e in STIFFNESSES:
+            for lag in LAGS:
+                y = self.x.copy()
+                y[[0, 2]] = START[0] + e, START[2] + lag
+                tries.append(self.bounded(y))
         costs = at_once(lambda y, body: self.cost(y, self.left(y, body)), tries, len(self.bodies))
         return [tries[n] for n in np.argsort(costs, kind="stable")]
 
-    def softest(self, say: Callable[[str], None]) -> np.ndarray:
-        """The best body, or a softer one that fits as well."""
-        starts = self.starts()
-        best = self.descend(starts[0], say)
-        below = [y for y in starts[1:] if y[0] < best[0] - SOFTER]
-        if not below:
-            return best
-        softer = self.descend(below[0], say)
-        return softer if self.cost(softer, self.left(softer)) < self.cost(best, self.left(best)) + ALIKE else best
+    def best(self, say: Callable[[str], None]) -> np.ndarray:
+        """The best body of several descents, or a softer one that fits as well."""
+        apart: list[np.ndarray] = []
+        for y in self.starts():
+            # Neighbours of a start end where it does.
+            if all(np.abs((y - z)[[0, 2]] / SPREAD[[0, 2]]).max() > 0.8 for z in apart):
+                apart.append(y)
+        ends, costs = [], []
+        for y in apart[:DESCENTS_FROM]:
+            ends.append(self.descend(y, say, min(costs, default=np.inf)))
+            costs.append(self.cost(ends[-1], self.left(ends[-1])))
+        return min((y for y, c in zip(ends, costs, strict=True) if c < min(costs) + ALIKE), key=lambda y: y[0])
 
-    def descend(self, y: np.ndarray, say: Callable[[str], None]) -> np.ndarray:
-        """Levenberg-Marquardt from y."""
+    def descend(self, y: np.ndarray, say: Callable[[str], None], bar: float = np.inf) -> np.ndarray:
+        """Levenberg-Marquardt from y; given up where it would not come below a cost of `bar`."""
         left = self.left(y)
         cost, damping = self.cost(y, left), 1e-2
-        for _ in range(DESCENTS):
-            say(f"base: E {np.exp(y[0]):.0f} Pa, nu {y[1]:.3f}, eta {np.exp(y[0] + y[2]):.2f} Pa s")
+        for n in range(DESCENTS):
+            say(f"base: {told(y, self.releases)}")
             slopes = self.slopes(y)
             normal = self.normal(slopes)
-            pull = self.space.gram(self.whiten(slopes).T, left[:, None])[:, 0] - (y - START) / SPREAD**2
+            pull = self.space.gram(self.whiten(slopes).T, left[:, None])[:, 0] - (y - self.middle) / self.reach**2
             for _ in range(4):
                 step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), pull)
-                there = bounded(y + np.clip(step, -1.2 * SPREAD, 1.2 * SPREAD), self.clip)
+                there = self.bounded(y + np.clip(step, -1.2 * self.reach, 1.2 * self.reach))
                 left_there = self.left(there)
                 cost_there = self.cost(there, left_there)
                 if cost_there < cost:
@@ -203,7 +315,7 @@ class _Around:
                 damping *= 8
             else:
                 return y
-            done = cost - cost_there < 0.5
+            done = cost - cost_there < 0.5 or (n > 0 and cost_there - HOPE * (cost - cost_there) > bar)
             y, left, cost, damping = there, left_there, cost_there, max(damping / 4, 1e-4)
             if done:
                 return y
@@ -230,14 +342,14 @@ def carried(carry, run: Run) -> np.ndarray:
 def simulate(prepared: Prepared, clip: Clip, x: np.ndarray, memo: Memo, frames: int) -> tuple[Drive, Run]:
     """The base up to frame `frames`, exclusive."""
     values = values_of(x)
-    made = memo(["base", x.tolist(), frames], lambda: vars(_run(prepared, clip, values, last=frames - 1)))
+    made = memo(["base", x.tolist(), frames, *clip.kind], lambda: vars(_run(prepared, clip, values, last=frames - 1)))
     return base_drive(prepared, clip, values), Run(**made)
 
 
 def base_drive(prepared: Prepared, clip: Clip, values: Values, safety: float = BOLD) -> Drive:
     """What carries the base along."""
     per_frame = prepared.per_frame(values, clip.fps, safety)
-    return prepared.drive(clip.motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames)
+    return prepared.drive(clip.motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames, late=clip.opening)
 
 
 def _run(prepared: Prepared, clip: Clip, values: Values, **span) -> Run:
@@ -268,11 +380,13 @@ def _short(clip, prepared, x, run, carry, first, last) -> np.ndarray:
     return carried(carry, moved)[:, 1:]
 
 
-def _window(clip: Clip) -> tuple[int, int]:
-    """From just before the first release for a while; everything where nothing is released."""
-    active = clip.motion.active[:, : clip.until] if len(clip.motion.active) else np.zeros((0, clip.until), bool)
-    ends = [int(np.flatnonzero(a)[-1]) for a in active if a.any()]
-    ends = [e for e in ends if e < clip.until - 3]
-    if not ends:
-        return 0, clip.until - 1
-    return max(min(ends) - 1, 0), min(clip.until - 1, min(ends) + round(AFTER * clip.fps))
+def _windows(clip: Clip) -> list[tuple[int, int]]:
+    """From just before each release for a while, none overlapping; everything where nothing is released."""
+    found: list[tuple[int, int]] = []
+    for _, end in sorted(clip.releases(), key=lambda r: r[1]):
+        first, last = max(end - 2, 0), min(clip.until - 1, end + math.ceil(AFTER * clip.fps))
+        if found and first <= found[-1][1]:
+            found[-1] = found[-1][0], max(last, found[-1][1])
+        else:
+            found.append((first, last))
+    return found or [(0, clip.until - 1)]

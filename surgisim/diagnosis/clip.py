@@ -1,13 +1,15 @@
 """A recording as the diagnosis sees it: points that the body carries, how they moved, which frames may be fitted."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.motion import Motion
+from surgisim.mpm.grip import runs
 from surgisim.mpm.setup import Prepared, prepare
 from surgisim.problem import Problem
+from surgisim.recordings.mesh import Mesh
 from surgisim.recordings.recording import Recording
 
 CLEAR = 1.3
@@ -16,6 +18,8 @@ DENSITY = 1050.0
 """Of tissue, where the recording gives none [kg/m^3]."""
 SHARE = 0.165
 """Spacing of the grid over the cube root of the body's volume."""
+OPENS = 0.5
+"""Frames after its last active one at which a grip opens, where nothing tells: no later than the next, on average."""
 SETTLES = 4
 """Frames after a release that are not taken as still."""
 QUIET = 1.6
@@ -48,6 +52,10 @@ class Clip:
     """Where the engine runs."""
     shifted: bool = True
     """Whether paths count from where grips find their tissue (`mpm/closing.py`), or from where it was at rest."""
+    raised: float = 0.0
+    """How far what is held reaches beyond its boxes [m]."""
+    late: np.ndarray | None = None
+    """How many frames after its last active one each grip opens (`mpm/grip.py`), (J, T); None for a half."""
 
     @property
     def frames(self) -> int:
@@ -79,6 +87,34 @@ class Clip:
             self.body, terms, density=self.density, carried=self.rest, grips=grips if len(grips.radius) else None,
             threads=threads, device=self.device, gravity=self.recording.gravity if falls else (0.0, 0.0, 0.0),
         )  # fmt: skip
+
+    @property
+    def kind(self) -> list:
+        """What runs of it depend on besides recording and laws, for JSON."""
+        late = [
+            [j, t, round(float(self.opening[j, t]), 9)] for j, on in enumerate(self.motion.active) for _, t in runs(on)
+        ]
+        return [round(float(self.body.spacing), 12), round(float(self.raised), 9), self.shifted, late]
+
+    @property
+    def opening(self) -> np.ndarray:
+        """How many frames after its last active one each grip opens, (J, T)."""
+        return np.full(self.motion.active.shape, OPENS) if self.late is None else self.late
+
+    def releases(self, before: int | None = None) -> list[tuple[int, int]]:
+        """Grip, and last active frame, of every release before a frame; of those that fitted frames show, if None."""
+        before = self.until - 3 if before is None else before
+        found = [(j, last) for j, on in enumerate(self.motion.active) for _, last in runs(on)]
+        return [(j, last) for j, last in found if last < before]
+
+    def laid(self, *, share: float | None = None, raised: float | None = None) -> "Clip":
+        """The same on a grid of another spacing, over the cube root of the body's volume, or held further up [m].
+
+        Raises Problem where nothing, or everything, would be held.
+        """
+        raised = self.raised if raised is None else raised
+        spacing = self.body.spacing if share is None else spacing_of(self.recording.mesh, share)
+        return replace(self, body=self.recording.body(float(spacing), raised), raised=raised)
 
     def quiet(self) -> np.ndarray:
         """Frames in which tissue is still or moves slowly: what the noise is read from, (T,) bool."""
@@ -124,9 +160,8 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
     share: spacing of the grid over the cube root of the body's volume. Raises Problem where fewer than 4 points
     remain, or where the recording has fewer than 8 frames to fit.
     """
-    mesh, motion = recording.mesh, recording.motion
-    thick = 2 * mesh.volume / mesh.area
-    spacing = min(share * np.cbrt(mesh.volume), 0.9 * thick)
+    motion = recording.motion
+    spacing = spacing_of(recording.mesh, share)
     body = recording.body(float(spacing))
     until = recording.fitted_until
     rest = recording.attached()
@@ -152,6 +187,11 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
     moved = recording.points[kept].astype(float) - rest[kept][:, None]
     moved = np.where(seen[..., None], moved, 0.0)
     return Clip(recording, body, kept, rest[kept], seen, moved, until, _normal(body, rest[kept]), device)
+
+
+def spacing_of(mesh: Mesh, share: float) -> float:
+    """Of a grid through a body [m], `share` of the cube root of its volume, or finer where the body is thin."""
+    return min(share * float(np.cbrt(mesh.volume)), 0.9 * 2 * mesh.volume / mesh.area)
 
 
 def _apart(rest: np.ndarray, seen: np.ndarray, most: int) -> np.ndarray:

@@ -21,6 +21,7 @@ from surgisim.diagnosis.locate import worst
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
+from surgisim.diagnosis.nuisance import Group
 from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
 from surgisim.diagnosis.sharpen import finer
 from surgisim.diagnosis.together import Together, needed, together
@@ -50,7 +51,11 @@ class Case:
     nulls: np.ndarray
     """(N, D)"""
     slopes: slice
-    """Where the base's own columns stand in the metric."""
+    """Where the base's own columns stand in the metric, after those of the groups."""
+    groups: list[Group]
+    """What a residual may hold beside physics, over the whole clip."""
+    drift: float
+    """How far the camera drifts over the clip, as its rest shows [m]."""
 
     @cached_property
     def flexible(self) -> Flexible:
@@ -167,20 +172,44 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
             noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0
         )
     whiten = whitener(noise, clip.rest, clip.seen[:, fitted], settings.offsets)
-    wrong = (
-        whiten(nuisance.simulator(clip, until, settings.model_error)).T
-        if settings.model_error
-        else np.zeros((3 * until * len(clip.kept), 1))
-    )
-    base = fit_base(clip, whiten, wrong, memo, workers=workers(clip, settings), say=lambda text: progress(0.1, 1, text))
-    parts = [wrong, whiten(nuisance.camera(clip, base.simulated[:, fitted])).T, whiten(base.slopes).T]
-    if settings.model_error and len(clip.motion.radius):
-        parts.append(whiten(nuisance.grips(clip, base.tangent, until)).T)
-    space = metric(np.concatenate(parts, 1))
+    drift = nuisance.drift_of(clip, noise, settings.offsets)
+
+    def beside(clip: Clip, x: np.ndarray, simulated: np.ndarray) -> np.ndarray:
+        error = nuisance.error_of(clip, x, simulated, memo, settings)
+        groups = nuisance.of_base(clip, simulated, error, drift, settings)
+        return whitened(whiten, groups, until)
+
+    clip, base = fit_base(
+        clip, whiten, beside, memo, workers=workers(clip, settings), timing="release" not in settings.without,
+        say=lambda text: progress(0.1, 1, text),
+    )  # fmt: skip
+    error = nuisance.error_of(clip, base.x, base.simulated, memo, settings)
+    groups = nuisance.of_laws(clip, base, error, drift, memo, settings, workers(clip, settings))
+    fixed = whitened(whiten, groups, until)
+    space = metric(np.concatenate([fixed, whiten(base.slopes).T], 1))
     z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
-    nulls = space.draw(np.random.default_rng(settings.seed), settings.nulls, whiten.without_constant)
-    first = sum(part.shape[1] for part in parts[:2])
-    return Case(clip, settings, noise, whiten, base, space, memo, z, nulls, slice(first, first + len(base.slopes)))
+    nulls = space.draw(np.random.default_rng(settings.seed), settings.nulls, whiten.known)
+    first = fixed.shape[1]
+    return Case(
+        clip,
+        settings,
+        noise,
+        whiten,
+        base,
+        space,
+        memo,
+        z,
+        nulls,
+        slice(first, first + len(base.slopes)),
+        groups,
+        drift,
+    )
+
+
+def whitened(whiten: Whitener, groups: list[Group], until: int) -> np.ndarray:
+    """Columns of all groups over the fitted frames, (N, M) float32."""
+    parts = [whiten(g.columns[:, :, :until]).T.astype(np.float32) for g in groups]
+    return np.concatenate(parts, 1) if parts else np.zeros((3 * whiten.mask.size, 0), np.float32)
 
 
 def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts | None = None) -> list[Finding]:

@@ -51,7 +51,7 @@ def _instead(clip: Clip, motion: Motion) -> Clip:
     planned = replace(
         recording, motion=motion, points=unseen, visible=np.zeros(shape, bool), place=recording.attached(), split=None
     )
-    return replace(clip, recording=planned, moved=np.zeros((len(clip.kept), frames, 3)))
+    return replace(clip, recording=planned, late=None, moved=np.zeros((len(clip.kept), frames, 3)))
 
 
 def pulls(clip: Clip, rng: np.random.Generator) -> list[tuple[str, Motion]]:

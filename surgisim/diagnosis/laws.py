@@ -152,7 +152,13 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
         def at(safety: float) -> Run:
             per_frame = steps(clip, prepared, theta, safety)
             drive = prepared.drive(
-                motion, values, fps=clip.fps, per_frame=per_frame, frames=clip.frames, places=law.places
+                motion,
+                values,
+                fps=clip.fps,
+                per_frame=per_frame,
+                frames=clip.frames,
+                places=law.places,
+                late=clip.opening,
             )
             if clip.shifted:
                 return follow(prepared.simulator, theta, drive, last=frames - 1)
@@ -163,9 +169,7 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
 
     moved = None if law.motion is None else np.round(law.motion.position, 9).tolist()
     where = {n: [list(p.center), p.extent, p.normal] for n, p in law.places.items()}
-    return memo(["law", base.x.tolist(), values, _plain(where), moved, frames, clip.shifted], make)["seen"].astype(
-        float
-    )
+    return memo(["law", base.x.tolist(), values, _plain(where), moved, frames, *clip.kind], make)["seen"].astype(float)
 
 
 def steps(clip: Clip, prepared: Prepared, theta: np.ndarray, safety: float = SAFETY) -> int:

@@ -2,27 +2,36 @@
 
 An axis of the error of point k at frame t is modelled as
 
-    d_k [ shared(x, t) + lasting_k(t) + white_k(t) ]
+    d_k [ shared(x, t) + camera(x, t) + lasting_k(t) + white_k(t) ]
 
-shared: c exp(-|x - x'|^2 / 2 l^2) + rigid (a constant and a gradient over the tissue), in time rho^|t - t'|; lasting: a
-r^|t - t'|; white: b. The numbers are those of largest restricted likelihood on frames in which the tissue is still,
-each stretch less its own polynomial in time, so that what physics moves slowly is not counted as noise (Patterson and
-Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika 58, 1971). In the eigenvectors
-of the spatial part every mode is a time series of its own, which a Cholesky factor whitens.
+shared: c exp(-|x - x'|^2 / 2 l^2), in time rho^|t - t'|; camera: a constant and a gradient over the tissue, which shake
+from frame to frame, in time s^|t - t'|; lasting: a r^|t - t'|; white: b. The numbers are those of largest restricted
+likelihood on frames in which the tissue is still, each stretch less its own polynomial in time, so that what physics
+moves slowly is not counted as noise (Patterson and Thompson, Recovery of inter-block information when block sizes are
+unequal, Biometrika 58, 1971). Patterns over the points (constant, gradients, then the eigenvectors of what is shared)
+are each a time series of their own, which a Cholesky factor whitens.
+
+What is not seen has no value: every sample that is missing is a direction of infinite variance, and so is each point's
+constant. Projecting those out of the whitened vectors is the exact marginal likelihood of the samples that are there.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
+from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
-MOST_POINTS = 90
-"""Points whose covariance is fitted; all are whitened."""
+MOST_POINTS, FEWER = 90, 45
+"""Points whose covariance is fitted, and where samples are missing; all are whitened."""
 SLOW = 4
 """Frames for each degree of the polynomial that is taken off a stretch."""
 STRETCH = 24
 """Frames of a stretch where no frames are known to be still."""
+SEEN = 0.6
+"""Share of a stretch in which a point must be seen to tell of the noise there."""
+FILLINGS = 3
+"""How often missing samples are drawn anew and the numbers fitted again, where samples are missing."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +48,8 @@ class Noise:
     """Variance of the gradient's part at the distance of the tissue's RMS radius."""
     keep_shared: float
     """Correlation of successive frames, rho."""
+    keep_rigid: float
+    """s"""
     lasting: float
     keep: float
     """r"""
@@ -50,25 +61,30 @@ class Noise:
         total = self.shared + self.rigid + self.tilt + self.lasting + self.white
         return float(np.sqrt((self.level**2).mean() * total))
 
-    def spatial(self, rest: np.ndarray) -> np.ndarray:
-        """Covariance of the shared part, (K, K)."""
-        return _spatial(rest, self.shared, self.length, self.rigid, self.tilt)
+    def modes(self, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Patterns over the points, (K, K), orthonormal columns, and each one's shared and camera variance, (K,)."""
+        return _modes(rest, self.shared, self.length, self.rigid, self.tilt)
 
-    def temporal(self, frames: int, modes: np.ndarray) -> np.ndarray:
-        """Covariance in time of every spatial mode with eigenvalue `modes`, (M, T, T)."""
-        return _temporal(np.arange(frames), modes, self.keep_shared, self.lasting, self.keep, self.white)
+    def temporal(self, frames: int, shared: np.ndarray, camera: np.ndarray) -> np.ndarray:
+        """Covariance in time of every pattern, (M, T, T)."""
+        return _temporal(
+            np.arange(frames), shared, camera, self.keep_shared, self.keep_rigid, self.lasting, self.keep, self.white
+        )
 
     def draw(self, rest: np.ndarray, frames: int, rng: np.random.Generator) -> np.ndarray:
         """Noise as modelled [m], (K, T, 3)."""
-        values, axes = np.linalg.eigh(self.spatial(rest))
-        factor = np.linalg.cholesky(self.temporal(frames, np.maximum(values, 0)))
+        axes, shared, camera = self.modes(rest)
+        factor = np.linalg.cholesky(self.temporal(frames, shared, camera))
         mode = np.einsum("mts,msc->mtc", factor, rng.standard_normal((len(rest), frames, 3)))
         return self.level[:, None, None] * np.einsum("km,mtc->ktc", axes, mode)
 
 
 @dataclass(frozen=True)
 class Whitener:
-    """Turns displacements (K, T, 3) into numbers of unit variance, less a constant of each point, (K T 3,)."""
+    """Turns displacements (K, T, 3) into numbers of unit variance, less what cannot be known, (K T 3,).
+
+    That is a constant of each point, and every sample that was not seen.
+    """
 
     scale: np.ndarray
     axes: np.ndarray
@@ -78,6 +94,8 @@ class Whitener:
     """What a constant becomes, of unit length, (M, T)."""
     mask: np.ndarray
     """(K, T)"""
+    lost: np.ndarray
+    """Orthonormal, what missing samples become, of one axis, (K T, L) float32."""
 
     def __call__(self, field: np.ndarray) -> np.ndarray:
         """Of fields [m], (..., K, T, 3), as (..., K T 3) float64."""
@@ -85,122 +103,197 @@ class Whitener:
         mode = np.tensordot(self.axes.T, np.moveaxis(scaled, -3, 0), (1, 0))
         shape = mode.shape
         mode = np.moveaxis(mode, -2, 1).reshape(shape[0], shape[-2], int(np.prod(shape[1:-2])) * shape[-1])
-        white = self.inverse @ mode
-        white = white - self.still[:, :, None] * (self.still[:, None] @ white)
+        white = self._known(self.inverse @ mode)
         white = white.reshape(shape[0], shape[-2], *shape[1:-2], shape[-1])
         white = np.moveaxis(np.moveaxis(white, 1, -2), 0, -3)
         return white.reshape(*white.shape[:-3], int(np.prod(white.shape[-3:])))
 
     def back(self, white: np.ndarray) -> np.ndarray:
         """The transpose: of numbers (K T 3,), as (K, T, 3)."""
-        mode = white.reshape(len(self.scale), -1, 3).astype(float)
-        mode = mode - self.still[:, :, None] * (self.still[:, None] @ mode)
+        mode = self._known(white.reshape(len(self.scale), -1, 3).astype(float))
         mode = np.swapaxes(self.inverse, 1, 2) @ mode
         return np.tensordot(self.axes, mode, (1, 0)) * (self.mask * self.scale[:, None])[..., None]
 
-    def without_constant(self, white: np.ndarray) -> np.ndarray:
-        """Numbers (K T 3, C) less what a constant of each point could be."""
-        parts = white.reshape(*self.still.shape, 3, -1)
+    def known(self, white: np.ndarray) -> np.ndarray:
+        """Numbers (K T 3, C) less what a constant of each point and unseen samples could be."""
+        parts = white.reshape(*self.still.shape, -1)
+        return self._known(parts).reshape(white.shape)
+
+    @property
+    def free(self) -> int:
+        """Degrees of freedom: samples that are seen, less a constant of each point, along three axes."""
+        return 3 * int(self.mask.sum() - np.any(self.still, 1).sum())
+
+    def _known(self, white: np.ndarray) -> np.ndarray:
+        """Of (M, T, C)."""
         still = self.still.astype(white.dtype)
-        parts = parts - still[:, :, None, None] * np.einsum("mt,mtic->mic", still, parts)[:, None]
-        return parts.reshape(white.shape)
+        white = white - still[:, :, None] * (still[:, None] @ white)
+        if not self.lost.shape[1]:
+            return white
+        flat = white.reshape(len(self.lost), -1)
+        lost = self.lost.astype(white.dtype, copy=False)
+        return (flat - lost @ (lost.T @ flat)).reshape(white.shape)
 
 
 def whitener(noise: Noise, rest: np.ndarray, seen: np.ndarray, offsets: bool = True) -> Whitener:
     """For points `rest` [m], (K, 3), seen where `seen`, (K, T); `offsets`: whether each has a constant of its own."""
-    values, axes = np.linalg.eigh(noise.spatial(rest))
-    factor = np.linalg.cholesky(noise.temporal(seen.shape[1], np.maximum(values, 0)))
+    axes, shared, camera = noise.modes(rest)
+    factor = np.linalg.cholesky(noise.temporal(seen.shape[1], shared, camera))
     inverse = np.linalg.inv(factor)
     still = inverse.sum(-1)
     still = still / np.linalg.norm(still, axis=1, keepdims=True) * offsets
-    return Whitener(1 / noise.level, axes, inverse, still, seen.astype(float))
+    none = np.zeros((seen.size, 0), np.float32)
+    plain = Whitener(1 / noise.level, axes, inverse, still, seen.astype(float), none)
+    return replace(plain, lost=_lost(plain, ~seen))
+
+
+def _lost(plain: Whitener, unseen: np.ndarray) -> np.ndarray:
+    """An orthonormal basis of what a value at each unseen sample, (K, T), becomes, (K T, L) float32."""
+    k, t = np.nonzero(unseen)
+    if not len(k):
+        return plain.lost
+    columns = np.einsum("lm,mtl->mtl", plain.axes[k], plain.inverse[:, :, t])
+    columns = columns - plain.still[:, :, None] * (plain.still[:, None] @ columns)
+    columns = columns.reshape(unseen.size, len(k))
+    # A point that is never seen has a constant among its unseen samples: what both span counts once.
+    gram = columns.T @ columns
+    values, vectors = np.linalg.eigh(gram)
+    kept = values > 1e-9 * values.max()
+    return (columns @ (vectors[:, kept] / np.sqrt(values[kept]))).astype(np.float32)
 
 
 def estimate(moved: np.ndarray, seen: np.ndarray, rest: np.ndarray, still: np.ndarray, nominal: np.ndarray) -> Noise:
     """From displacements [m], (K, T, 3), where `seen`, (K, T), on frames that are `still`, (T,) bool.
 
     nominal: what the recording says of each point's noise [m], (K,); it decides where nothing can be estimated.
+    Missing samples of a stretch are drawn from what the seen ones leave open, and the numbers fitted again.
     """
-    level = _levels(moved, seen, nominal)
-    stretches = _stretches(still)
+    level = np.maximum(_levels(moved, seen, nominal), 1e-9)
     rng = np.random.default_rng(0)
-    chosen = np.arange(len(rest)) if len(rest) <= MOST_POINTS else np.sort(rng.permutation(len(rest))[:MOST_POINTS])
-    data = []
-    for frames in stretches:
-        mine = chosen[seen[np.ix_(chosen, frames)].all(1)]
-        if len(mine) < 4:
-            continue
+    most = MOST_POINTS if seen[:, still].all() else FEWER
+    chosen = np.arange(len(rest)) if len(rest) <= most else np.sort(rng.permutation(len(rest))[:most])
+    parts = []
+    for frames in _stretches(still):
+        mine = chosen[seen[np.ix_(chosen, frames)].mean(1) >= SEEN]
+        if len(mine) >= 4:
+            parts.append(_Stretch.of(moved, seen, rest, level, mine, frames))
+    noise = Noise(level, **_unpacked(START))
+    if not parts:
+        return noise
+    gaps = any(not part.seen.all() for part in parts)
+    x = START
+    for n in range(FILLINGS if gaps else 1):
+        filled = [part.filled(noise, rng) for part in parts]
+        x = _fitted(filled, x, 420 if n == 0 else 160)
+        noise = Noise(level, **_unpacked(x))
+    return noise
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Successive frames of some points, over their levels."""
+
+    rest: np.ndarray
+    """(K, 3)"""
+    seen: np.ndarray
+    """(K, T)"""
+    value: np.ndarray
+    """(K, T, 3), of seen samples."""
+    slow: np.ndarray
+    """Polynomials in time, (T, B)."""
+
+    @classmethod
+    def of(cls, moved, seen, rest, level, mine, frames) -> "_Stretch":
         slow = legvander(np.linspace(-1, 1, len(frames)), max(1, len(frames) // SLOW))
-        basis = np.linalg.qr(slow, mode="complete")[0][:, slow.shape[1] :]
-        data.append(
-            (
-                rest[mine],
-                frames,
-                basis,
-                np.einsum("ts,ktc->ksc", basis, moved[np.ix_(mine, frames)] / level[mine, None, None]),
-            )
-        )
-    if not data:
-        return Noise(np.maximum(level, 1e-9), 0.2, 0.006, 0.02, 0.02, 0.7, 0.3, 0.75, 0.45)
+        at = np.ix_(mine, frames)
+        return cls(rest[mine], seen[at], moved[at] / level[mine, None, None], slow)
+
+    def filled(self, noise: Noise, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points, contrasts that no polynomial changes, (T, C), and the values' contrasts, (K, C, 3)."""
+        value = self.value
+        if not self.seen.all():
+            value = self._completed(noise, rng)
+        basis = np.linalg.qr(self.slow, mode="complete")[0][:, self.slow.shape[1] :]
+        return self.rest, basis, np.einsum("ts,ktc->ksc", basis, value)
+
+    def _completed(self, noise: Noise, rng: np.random.Generator) -> np.ndarray:
+        """Values with those that are missing drawn from what the seen ones leave open (kriging with a trend)."""
+        axes, shared, camera = noise.modes(self.rest)
+        cov = np.einsum("km,mts,lm->ktls", axes, noise.temporal(len(self.slow), shared, camera), axes, optimize=True)
+        size = self.seen.size
+        # A trend of each point, as uncertain as anything that moves slowly.
+        trend = 30.0**2 * self.slow @ self.slow.T
+        cov = cov.reshape(size, size) + np.kron(np.eye(len(self.rest)), trend)
+        there, gone = np.flatnonzero(self.seen), np.flatnonzero(~self.seen)
+        factor = cho_factor(cov[np.ix_(there, there)])
+        weight = cho_solve(factor, cov[np.ix_(there, gone)]).T
+        rest = cov[np.ix_(gone, gone)] - weight @ cov[np.ix_(there, gone)]
+        values, vectors = np.linalg.eigh(0.5 * (rest + rest.T))
+        spread = vectors * np.sqrt(np.maximum(values, 0))
+        flat = self.value.reshape(size, 3).copy()
+        flat[gone] = weight @ flat[there] + spread @ rng.standard_normal((len(gone), 3))
+        return flat.reshape(self.value.shape)
+
+
+def _fitted(data: list, x: np.ndarray, most: int) -> np.ndarray:
+    """Numbers of largest restricted likelihood, from x."""
 
     def cost(x: np.ndarray) -> float:
         part = _unpacked(x)
         total = 0.5 * float(((x - START) ** 2 / SPREAD**2).sum())
-        for where, frames, basis, z in data:
-            values, axes = np.linalg.eigh(_spatial(where, part["shared"], part["length"], part["rigid"], part["tilt"]))
-            cov = _temporal(
-                np.arange(len(frames)),
-                np.maximum(values, 0),
-                part["keep_shared"],
-                part["lasting"],
-                part["keep"],
-                part["white"],
-            )
-            cov = basis.T @ cov @ basis
+        for where, basis, z in data:
+            axes, shared, camera = _modes(where, part["shared"], part["length"], part["rigid"], part["tilt"])
+            keeps = (part[name] for name in ("keep_shared", "keep_rigid", "lasting", "keep", "white"))
+            cov = basis.T @ _temporal(np.arange(len(basis)), shared, camera, *keeps) @ basis
             factor = np.linalg.cholesky(cov)
             mode = np.einsum("km,ksc->msc", axes, z)
             white = np.linalg.solve(factor, mode)
             total += 0.5 * float((white**2).sum()) + 3 * float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum())
         return total
 
-    found = minimize(
-        cost,
-        START,
-        method="Nelder-Mead",
-        options={
-            "maxfev": 420,
-            "xatol": 0.03,
-            "fatol": 0.5,
-            "initial_simplex": START + np.vstack([np.zeros(len(START)), 0.5 * np.eye(len(START))]),
-        },
-    )
-    return Noise(level, **_unpacked(found.x))
+    simplex = x + np.vstack([np.zeros(len(x)), 0.5 * np.eye(len(x))])
+    options = {"maxfev": most, "xatol": 0.03, "fatol": 0.5, "initial_simplex": simplex}
+    return minimize(cost, x, method="Nelder-Mead", options=options).x
 
 
-START = np.array([-1.2, np.log(0.006), -3.0, -3.0, 1.0, -1.2, 1.0, -0.8])
-SPREAD = np.array([1.5, 0.6, 1.5, 1.5, 1.0, 1.5, 1.0, 1.5])
-"""Of the prior on: log shared, log length [m], log rigid, log tilt, logit rho, log lasting, logit r, log white."""
+START = np.array([-1.2, np.log(0.006), -3.0, -3.0, 1.0, 0.0, -1.2, 1.0, -0.8])
+SPREAD = np.array([1.5, 0.6, 1.5, 1.5, 1.0, 1.0, 1.5, 1.0, 1.5])
+"""Of the prior on: log shared, log length [m], log rigid, log tilt, logit rho, logit s, log lasting, logit r,
+log white.
+Wide: a factor of four and more either way, correlations of .3 to .9; what no still frames tell is at its middle."""
 
 
 def _unpacked(x: np.ndarray) -> dict[str, float]:
     e, s = np.exp(np.clip(x, -12, 6)), 0.97 / (1 + np.exp(-x))
     return {
-        "shared": e[0], "length": e[1], "rigid": e[2], "tilt": e[3], "keep_shared": s[4], "lasting": e[5],
-        "keep": s[6], "white": e[7] + 1e-3,
+        "shared": e[0], "length": e[1], "rigid": e[2], "tilt": e[3], "keep_shared": s[4], "keep_rigid": s[5],
+        "lasting": e[6], "keep": s[7], "white": e[8] + 1e-3,
     }  # fmt: skip
 
 
-def _spatial(rest, shared, length, rigid, tilt) -> np.ndarray:
+def _modes(rest, shared, length, rigid, tilt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     away = ((rest[:, None] - rest[None]) ** 2).sum(-1)
+    kernel = shared * np.exp(-0.5 * away / length**2)
     arm = rest - rest.mean(0)
     reach = max(float((arm**2).sum(1).mean()), 1e-12)
-    return shared * np.exp(-0.5 * away / length**2) + rigid + tilt * (arm @ arm.T) / reach
+    left, size, _ = np.linalg.svd(arm, full_matrices=False)
+    size = size**2 * (size > 1e-6 * size.max())
+    whole = np.concatenate([np.full((len(rest), 1), len(rest) ** -0.5), left[:, size > 0]], 1)
+    # What neighbours share splits into the camera's patterns and the rest; how the two are related is left out.
+    basis = np.linalg.qr(whole, mode="complete")[0]
+    beyond = basis[:, whole.shape[1] :]
+    values, vectors = np.linalg.eigh(beyond.T @ kernel @ beyond)
+    axes = np.concatenate([whole, beyond @ vectors], 1)
+    shares = np.concatenate([np.einsum("km,kl,lm->m", whole, kernel, whole, optimize=True), values])
+    camera = np.zeros(len(rest))
+    camera[: whole.shape[1]] = np.concatenate([[rigid * len(rest)], tilt * size[size > 0] / reach])
+    return axes, np.maximum(shares, 0), camera
 
 
-def _temporal(frames, modes, keep_shared, lasting, keep, white) -> np.ndarray:
+def _temporal(frames, shared, camera, keep_shared, keep_rigid, lasting, keep, white) -> np.ndarray:
     lag = np.abs(frames[:, None] - frames[None])
     own = lasting * keep**lag + white * np.eye(len(frames))
-    return modes[:, None, None] * keep_shared**lag + own
+    return shared[:, None, None] * keep_shared**lag + camera[:, None, None] * keep_rigid**lag + own
 
 
 def _levels(moved, seen, nominal) -> np.ndarray:

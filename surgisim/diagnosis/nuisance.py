@@ -1,96 +1,259 @@
-"""What a residual may hold that is no tissue's physics: the camera's faults and the simulator's own error."""
+"""What a residual may hold that is no tissue's physics: what a recording leaves open, and the simulator's own error.
+
+Every kind is a group of directions, each at one prior standard deviation, that base and every law are fitted with. A
+kind's columns come from the engine itself wherever it can say them, for the body at hand: a finer grid, a larger grip,
+another place of it, another elastic law. None is read off one generator's recordings; the sizes below are what people
+who grip, glue, film and track are taken to be able to do.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis.base import HELD, LATE, LATEST, Base, by_held, tracks_of
 from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.form import hats, plane
+from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.noise import Noise, whitener
+from surgisim.estimation.trial import at_once
+from surgisim.mpm.simulator import Breakdown
+from surgisim.problem import Problem
 
 LAG = 0.02
-"""Standard deviation of the tracker's lag [s]."""
-SCALE = 0.01
-"""Of the depth's, or the recording's, scale [1]."""
-DRIFT = 1e-4
-"""Of a rigid drift over the clip [m]."""
-RADII = (1.3, 1.6, 2.0, 3.0, 4.0, 6.0)
-"""Rings around a grip, in its radii, to which SHARES belong."""
-SHARES = (0.080, 0.060, 0.045, 0.030, 0.022, 0.014)
-"""Standard deviation of the simulator's error along an axis, over how far the grip has carried the tissue: between the
-engine and the phantom's finite elements on bodies without hidden physics (docs/diagnosis.md)."""
-ALIKE = 0.008
-"""Distance over which that error is alike [m]."""
+"""Standard deviation of the tracker's lag [s]: half a frame at 25 Hz."""
+SCALE = 0.03
+"""Of the scale along each axis [1]: a focal length or a depth is known to some per cent."""
+DRIFT, DRIFT_SPREAD = 1.5e-4, 1.2
+"""Median and spread (logarithm) of how far a camera drifts over a clip [m], before its rest has been looked at."""
+DRIFTS = np.geomspace(2e-5, 3e-3, 16)
+"""Sizes that are weighed [m]."""
+WALKS = 3
+"""Courses of a drift: the first of a random walk's (Karhunen and Loeve); the last goes to and fro 1.25 times."""
+LEAST_REST = 6
+"""Frames of rest from which a drift is learned."""
 FIRM = 0.15
-"""Standard deviation of how much more or less than all of its path a grip carries along [1]."""
-MODES = 24
-"""Spatial patterns kept of it."""
-BENT = 0.3
-"""Share of it that grows with the square of the load instead."""
-REBOUND = 0.5
-"""Share of it that is left in the first frame after a release."""
-FADES = 0.06
-"""How fast that fades [s]."""
+"""Of how much more or less than all of its path a grip carries along [1]."""
+RADIUS, CENTRE, PATH = 0.1, 5e-4, 1e-4
+"""Of a grip's radius [1], of its centre [m], and of its path from moment to moment [m]."""
+SOON = 0.2
+"""Of the moment of a release whose frames were fitted, about what came out [frames]: there tracks bend with it."""
+LAWS = ("corotated", "neo_hookean")
+"""Elastic laws that tissue may follow instead of the base's; a standard deviation is the whole way to each."""
+FINER = 0.79
+"""Spacing of the finer grid that tells the simulator's error, over that of the search."""
+WHOLE, APART, BENT, ASKEW = 1.5, 0.75, 0.5, 0.3
+"""Of the simulator's error over the difference that a finer grid makes: of all of it, of what tissue does while held
+and after apart, of a factor that varies over the tissue, and of what points elsewhere. Halving a grid's spacing takes
+off 3/4 of an error of second order, 1/2 of one of first: the difference to FINER is .4 to .2 of the whole, but what is
+left out of the search (points near a grip) is where it is largest; engine and other people's elements agree to .05 of
+.22 mm with one free factor near 1."""
+ALIKE = 1.4
+"""Distance over which such a factor is alike, in cells."""
+PATTERNS = 14
 
 
-def camera(clip: Clip, simulated: np.ndarray) -> np.ndarray:
-    """Lag, scale and rigid drift, each at one standard deviation [m], (C, K, T, 3), T the fitted frames."""
-    frames = simulated.shape[1]
+@dataclass(frozen=True)
+class Group:
+    """Directions of one kind."""
+
+    name: str
+    columns: np.ndarray
+    """At one prior standard deviation [m], (C, K, T, 3)."""
+    values: tuple[tuple[str, float, str], ...] = ()
+    """Name, prior standard deviation and unit of each direction that a reader would ask for, in order."""
+
+
+def of_base(clip: Clip, simulated: np.ndarray, error: np.ndarray, drift: float, settings: Diagnosing) -> list[Group]:
+    """What a base is fitted with. error: what a finer grid changes [m], (K, T, 3); drift: its size [m]."""
+    groups = [*camera(clip, simulated), drifting(clip, drift), simulator(clip, error, settings.model_error)]
+    return chosen(groups, settings)
+
+
+def of_laws(
+    clip: Clip, base: Base, error: np.ndarray, drift: float, memo: Memo, settings: Diagnosing, workers: int
+) -> list[Group]:
+    """What laws are fitted with: the same, and grips, held tissue and elastic laws that may be others."""
+    near, held = base.tangent, HELD * by_held(clip, base.x, base.simulated, memo)
+    groups = [*other_bodies(clip, base, memo, workers), firmness(clip, near), path(clip, near)]
+    if held.any():
+        groups.append(Group("held", held[None], (("where what is held ends", HELD, "m"),)))
+    return of_base(clip, base.simulated, error, drift, settings) + chosen(groups, settings)
+
+
+def chosen(groups: list[Group], settings: Diagnosing) -> list[Group]:
+    """Those that are not left out, and that act."""
+    return [g for g in groups if g.name not in settings.without and len(g.columns)]
+
+
+def camera(clip: Clip, simulated: np.ndarray) -> list[Group]:
+    """A tracker's lag and scales along three axes."""
     velocity = np.gradient(simulated, axis=1) * clip.fps
-    arm = clip.rest - clip.rest.mean(0)
-    reach = max(float(np.sqrt((arm**2).sum(1).mean())), 1e-9)
-    time = np.linspace(0, 1, frames)[None, :, None]
-    drifts = [np.broadcast_to(DRIFT * time * e, simulated.shape) for e in np.eye(3)]
-    drifts += [DRIFT * time * np.cross(e, arm / reach)[:, None] for e in np.eye(3)]
-    return np.stack([LAG * velocity, SCALE * simulated, *drifts])
+    scales = np.stack([SCALE * simulated * e for e in np.eye(3)])
+    named = tuple((f"scale along {a}", SCALE, "1") for a in "xyz")
+    return [Group("lag", LAG * velocity[None], (("tracker lag", LAG, "s"),)), Group("scale", scales, named)]
 
 
-def grips(clip: Clip, near, frames: int) -> np.ndarray:
-    """How firmly the grid carries a gripped ball along, at one standard deviation [m], (C, K, T, 3).
+def drifting(clip: Clip, size: float, frames: int | None = None) -> Group:
+    """Slow motions of the camera, bilinear over the tissue, by about `size` [m] until the end."""
+    frames = frames or clip.frames
+    flat = (clip.rest - clip.rest.mean(0)) @ plane(clip).T
+    u, v = (flat / np.maximum(np.sqrt((flat**2).mean(0)), 1e-9)).T
+    patterns = np.stack([np.ones_like(u), u, v, u * v])
+    k = np.arange(1, WALKS + 1)[:, None] - 0.5
+    time = np.arange(frames) / max(clip.frames - 1, 1)
+    courses = np.sqrt(2) * np.sin(k * np.pi * time) / (k * np.pi)
+    field = np.einsum("pk,ct->pckt", patterns, courses).reshape(-1, len(clip.rest), frames)
+    return Group("drift", size * np.concatenate([field[..., None] * e for e in np.eye(3)]))
+
+
+def drift_of(clip: Clip, noise: Noise, offsets: bool) -> float:
+    """How far the camera drifts over a clip [m], from the rest before the first grasp: RMS of the posterior."""
+    log_prior = -0.5 * (np.log(DRIFTS / DRIFT) / DRIFT_SPREAD) ** 2
+    busy = clip.motion.active.any(0) if len(clip.motion.active) else np.ones(clip.frames, bool)
+    rest = min(int(busy.argmax()) if busy.any() else clip.frames, clip.until)
+    if rest >= LEAST_REST:
+        seen = clip.seen[:, :rest]
+        mine = seen.any(1)
+        whiten = whitener(replace(noise, level=noise.level[mine]), clip.rest[mine], seen[mine], offsets)
+        z = whiten(clip.moved[mine, :rest])
+        U = whiten(drifting(clip, 1.0, rest).columns[:, mine]).T
+        gram, shadow = U.T @ U, U.T @ z
+        values, vectors = np.linalg.eigh(gram)
+        values, turned = np.maximum(values, 0), (vectors.T @ shadow) ** 2
+        for n, size in enumerate(DRIFTS):
+            grown = 1 + size**2 * values
+            log_prior[n] += 0.5 * (size**2 * turned / grown).sum() - 0.5 * np.log(grown).sum()
+    weight = np.exp(log_prior - log_prior.max())
+    return float(np.sqrt((weight * DRIFTS**2).sum() / weight.sum()))
+
+
+def error_of(clip: Clip, x: np.ndarray, simulated: np.ndarray, memo: Memo, settings: Diagnosing) -> np.ndarray:
+    """What a finer grid changes in a base's tracks [m], (K, T, 3); zero where the engine breaks down on it."""
+    if settings.model_error == 0 or "simulator" in settings.without:
+        return np.zeros_like(simulated)
+    try:
+        return tracks_of(clip.laid(share=FINER * settings.grid), x, memo) - simulated
+    except Breakdown:
+        return np.zeros_like(simulated)
+
+
+def simulator(clip: Clip, error: np.ndarray, share: float = 1.0) -> Group:
+    """The simulator's own error, known by what a finer grid changes [m], (K, T, 3): like it, and of its size.
+
+    share: times what is expected.
+    """
+    if not error.any() or share == 0:
+        return Group("simulator", np.zeros((0, *error.shape)))
+    error = share * error
+    apart = np.linalg.norm(clip.rest[:, None] - clip.rest[None], axis=-1)
+    alike = np.exp(-0.5 * (apart / (ALIKE * clip.body.spacing)) ** 2)
+    values, axes = np.linalg.eigh(alike)
+    order = np.argsort(values)[::-1][:PATTERNS]
+    patterns = (axes[:, order] * np.sqrt(np.maximum(values[order], 0))).T
+    held = clip.motion.active.any(0) if len(clip.motion.active) else np.zeros(clip.frames, bool)
+    spans = [span for span in (held, ~held) if span.any()]
+    result = [WHOLE * error, *(APART * error * span[None, :, None] for span in spans)]
+    result += [BENT * error * p[:, None, None] for p in patterns]
+    near = alike / alike.sum(1, keepdims=True)
+    for span in spans:
+        square = (error**2).sum(-1) / 3 * span
+        size = np.sqrt(near @ square.mean(1) * len(span) / span.sum())
+        course = np.sqrt(square.mean(0) / max(square.mean(0)[span].mean(), 1e-30))
+        result += [ASKEW * (p * size)[:, None, None] * course[None, :, None] * e for p in patterns for e in np.eye(3)]
+    return Group("simulator", np.stack(result))
+
+
+def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group]:
+    """Grips of another size or place, or that open sooner, and tissue of another elastic law, by the engine."""
+    motion, runs = clip.motion, []
+    u, v = plane(clip)
+    for j in range(len(motion.radius)):
+        if not motion.active[j].any():
+            continue
+        one = np.eye(len(motion.radius))[j]
+        larger = replace(motion, radius=motion.radius * (1 + RADIUS * one))
+        runs.append(("grip radius", (f"radius of grip {j}", RADIUS, "1"), larger, None))
+        for axis, way in (("u", u), ("v", v)):
+            by = CENTRE * one[:, None] * way
+            aside = replace(motion, center_rest=motion.center_rest + by, position=motion.position + by[:, None])
+            runs.append(("grip centre", (f"centre of grip {j} along {axis}", CENTRE, "m"), aside, None))
+    for j in np.flatnonzero(motion.active.any(1) & ~motion.active[:, : clip.until].any(1)):
+        # Of grips that fitted frames show, the tangent says it (`firmness`).
+        way = np.eye(len(motion.radius))[j][:, None, None] * (motion.position - motion.center_rest[:, None])
+        further = replace(motion, position=motion.position + FIRM * way)
+        runs.append(("grip firmness", (f"firmness of grip {j}", FIRM, "1"), further, None))
+    runs = [
+        (name, told, replace(clip, recording=replace(clip.recording, motion=m)), terms, 1.0)
+        for name, told, m, terms in runs
+    ]
+    runs += [("elastic law", (name, 1.0, "1"), clip, (name, "newtonian"), 1.0) for name in LAWS]
+    for j, last in clip.releases(clip.frames - 1):
+        known = last < clip.until - 3
+        sd, by = (SOON if known else LATE), (-0.25 if clip.opening[j, last] > LATEST - 0.25 else 0.25)
+        late = clip.opening.copy()
+        late[j, last] += by
+        when = (f"release of grip {j} after frame {last}", sd / clip.fps, "s")
+        runs.append(("release", when, replace(clip, late=late), None, sd / by))
+
+    def moved(run, _worker: int) -> np.ndarray | None:
+        _, _, other, terms, times = run
+        try:
+            return times * (tracks_of(other, base.x, memo, terms or base.prepared.terms) - base.simulated)
+        except (Breakdown, Problem):
+            return None
+
+    groups: dict[str, Group] = {}
+    for (name, told, *_), change in zip(runs, at_once(moved, runs, workers), strict=True):
+        if change is not None:
+            before = groups.get(name, Group(name, np.zeros((0, *change.shape))))
+            groups[name] = Group(name, np.concatenate([before.columns, change[None]]), (*before.values, told))
+    return list(groups.values())
+
+
+def firmness(clip: Clip, near) -> Group:
+    """How firmly a gripped ball is carried along.
 
     A ball that is a little larger or smaller than it should be carries its surroundings by a constant share more or
     less; slipping, which begins at some moment, is not of that form.
     """
-    result = []
+    result, frames = [], clip.until
     for j in range(len(clip.motion.radius)):
         active = clip.motion.active[j, :frames]
         if not active.any():
             continue
-        path = np.where(active[:, None], clip.motion.position[j, :frames] - clip.motion.center_rest[j], 0.0)
-        loads = near.anchored(1 + j).T
-        states = near.at_states(np.broadcast_to(loads, (len(near.frames), *loads.shape)))
-        parts = np.stack([near.over_time(states[:, d], np.ones(frames)) for d in range(3)])
-        whole = np.einsum("dkti,td->kti", parts, path)
-        share = np.linalg.norm(path, axis=1) / max(np.linalg.norm(path, axis=1).max(), 1e-9)
+        way = np.where(active[:, None], clip.motion.position[j, :frames] - clip.motion.center_rest[j], 0.0)
+        parts = _carried(clip, near, j)
+        whole = np.einsum("dkti,td->kti", parts, way)
+        reach = np.linalg.norm(way, axis=1)
+        share = reach / max(reach.max(), 1e-9)
         result += [FIRM * whole, FIRM / 2 * whole * (2 * share - 1)[None, :, None]]
-        reach = np.linalg.norm(path, axis=1)
         result += [FIRM / 2 * parts[d] * reach[None, :, None] for d in range(3)]
-    return np.stack(result) if result else np.zeros((0, len(clip.kept), frames, 3))
+    return Group("grip firmness", _to_the_end(result, clip))
 
 
-def simulator(clip: Clip, frames: int, share: float = 1.0) -> np.ndarray:
-    """Patterns of the simulator's error at one standard deviation [m], (C, K, T, 3).
+def path(clip: Clip, near) -> Group:
+    """Where a grip carries tissue, from moment to moment."""
+    result = []
+    for j in range(len(clip.motion.radius)):
+        active = clip.motion.active[j, : clip.until]
+        if active.any():
+            parts = _carried(clip, near, j)
+            courses = [bump * active for bump in hats(clip) if (bump * active).any()]
+            result += [PATH * parts[d] * course[None, :, None] for course in courses for d in range(3)]
+    return Group("grip path", _to_the_end(result, clip))
 
-    share: times what was measured.
-    """
-    motion, result = clip.motion, []
-    for j in range(len(motion.radius)):
-        active = motion.active[j, :frames]
-        if not active.any():
-            continue
-        carried = np.where(active, np.linalg.norm(motion.position[j] - motion.center_rest[j], axis=-1)[:frames], 0.0)
-        most = carried.max()
-        if most <= 0:
-            continue
-        radii = np.linalg.norm(clip.rest - motion.center_rest[j], axis=1) / motion.radius[j]
-        sd = share * np.exp(np.interp(np.log(radii), np.log(RADII), np.log(SHARES)))
-        apart = np.linalg.norm(clip.rest[:, None] - clip.rest[None], axis=-1)
-        values, axes = np.linalg.eigh(sd[:, None] * sd[None] * np.exp(-apart / ALIKE))
-        order = np.argsort(values)[::-1][:MODES]
-        patterns = axes[:, order] * np.sqrt(np.maximum(values[order], 0))
-        since = np.arange(frames) - np.flatnonzero(active)[-1] - 1
-        after = np.where(since >= 0, np.exp(-np.maximum(since, 0) / clip.fps / FADES), 0.0) * most * REBOUND
-        courses = [(carried, MODES), (BENT * carried * (1 - carried / most) * 2, MODES // 2)]
-        if after.any():
-            courses.append((after, MODES // 2))
-        for course, count in courses:
-            for m in range(min(count, patterns.shape[1])):
-                for e in np.eye(3):
-                    result.append(patterns[:, m, None, None] * course[None, :, None] * e)
-    return np.stack(result) if result else np.zeros((0, *clip.moved[:, :frames].shape))
+
+def _carried(clip: Clip, near, j: int) -> np.ndarray:
+    """Displacement of the points by a shift of grip j along each axis, frame by frame [1], (3, K, T_fit, 3)."""
+    loads = near.anchored(1 + j).T
+    states = near.at_states(np.broadcast_to(loads, (len(near.frames), *loads.shape)))
+    return np.stack([near.over_time(states[:, d], np.ones(clip.until)) for d in range(3)])
+
+
+def _to_the_end(columns: list[np.ndarray], clip: Clip) -> np.ndarray:
+    """Columns over the fitted frames, with nothing after them, (C, K, T, 3)."""
+    whole = np.zeros((len(columns), len(clip.kept), clip.frames, 3))
+    for n, column in enumerate(columns):
+        whole[n, :, : clip.until] = column
+    return whole

@@ -1,5 +1,6 @@
 """The driven region: which particles a grip holds, and the path it carries them along."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,6 +67,7 @@ def drive(
     stiffness: float,
     grip: float = 1.0,
     frames: int | None = None,
+    late: np.ndarray | None = None,
 ) -> Drive:
     """The boundary condition of a replay of `motion` on particles `rest` [m], (P, 3), of `volume` [m^3], (P,).
 
@@ -73,6 +75,8 @@ def drive(
     anchors per unit of mass [1/s^2]; `grip` is the share of it that instruments get.
     Between frames the path is a monotone cubic (Fritsch and Carlson, 1980), so the instrument does
     not jerk at every frame; before and after its active frames a grip holds nothing.
+    late: how many frames after its last active frame each grip opens, for the run of active frames that ends there,
+    (J, T); before it, where negative. A grip that holds on past its last active frame moves on as it did. 0 if None.
     Raises Problem if a grip holds no particle, or more than 31 grips are asked for.
     """
     grips, motion_frames = motion.active.shape if len(motion.active) else (0, frames or motion.active.shape[-1])
@@ -83,8 +87,8 @@ def drive(
     member, share = held.astype(np.int32), held.astype(float)
     size = np.cbrt(volume)
     path = np.zeros((1 + grips, steps + 1, 3))
-    active = np.zeros((1 + grips, steps), bool)
-    active[0] = True
+    hold = np.zeros((1 + grips, steps))
+    hold[0] = 1.0
     clock = np.arange(steps + 1) / per_frame
     for j in range(grips):
         away = np.linalg.norm(rest - motion.center_rest[j], axis=1)
@@ -99,14 +103,35 @@ def drive(
             )
         member |= near.astype(np.int32) << (1 + j)
         share = np.maximum(share, inside)
-        offset = motion.position[j] - motion.center_rest[j]
+        on = motion.active[j].astype(bool)
+        after = np.zeros(len(on)) if late is None else np.asarray(late[j], float)
+        offset = _carried_on(motion.position[j] - motion.center_rest[j], on, after)
         at = np.minimum(clock, len(offset) - 1)
         path[1 + j] = PchipInterpolator(np.arange(len(offset)), offset)(at) if len(offset) > 1 else offset[0]
-        # Held from the first active frame until the last: a release between two frames is the later one's.
-        on = motion.active[j].astype(bool)
-        frame = np.minimum(np.arange(steps) // per_frame, len(on) - 1)
-        active[1 + j] = on[frame] & on[np.minimum(frame + 1, len(on) - 1)]
+        # Held from the first active frame until the grip opens: without `late`, at the last active one.
+        for first, last in runs(on):
+            opens = steps if last == len(on) - 1 else (last + after[last]) * per_frame
+            # A step in which it opens is held for a share of it.
+            mine = np.clip(opens - np.arange(steps), 0.0, 1.0) * (np.arange(steps) >= first * per_frame)
+            hold[1 + j] = np.maximum(hold[1 + j], mine)
     springs = stiffness * np.concatenate([[1.0], np.full(grips, grip)])
     center = np.concatenate([rest[held].mean(0, keepdims=True) if held.any() else np.zeros((1, 3)), motion.center_rest])
     spring = springs[:, None, None] * np.eye(3)
-    return Drive(member, share, path, active.astype(float), step, per_frame, spring, center)
+    return Drive(member, share, path, hold, step, per_frame, spring, center)
+
+
+def runs(on: np.ndarray) -> list[tuple[int, int]]:
+    """First and last frame of every run of active ones, (T,) bool."""
+    edges = np.diff(np.concatenate([[0], on.astype(int), [0]]))
+    return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
+
+
+def _carried_on(offset: np.ndarray, on: np.ndarray, late: np.ndarray) -> np.ndarray:
+    """Offsets [m], (T, 3), of which those just after a grip's last active frame go on as it last moved."""
+    offset = offset.copy()
+    for first, last in runs(on):
+        ahead = max(math.ceil(late[last] - 1e-9), 0) if last + 1 < len(on) else 0
+        step = offset[last] - offset[last - 1] if last > first else np.zeros(3)
+        for n in range(1, min(ahead, len(on) - 1 - last) + 1):
+            offset[last + n] = offset[last] + n * step
+    return offset

@@ -76,8 +76,9 @@ class Prepared:
         grip: float = 1.0,
         places: Mapping[str, Place] | None = None,
         firm: bool = True,
+        late: np.ndarray | None = None,
     ) -> Drive:
-        """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values` at `places`.
+        """The boundary condition of `motion`; `late` as in `grip.drive`; the anchors' spring follows the tissue's modulus in `values` at `places`.
 
         firm: whether the base is known to hold, as in a recording that says so. Where it is guessed, as in a video,
         one that gives way a little is the better guess: held hard at the wrong place, a release fits a modulus many
@@ -104,11 +105,15 @@ class Prepared:
             frames=frames,
             stiffness=spring,
             grip=grip,
+            late=late,
         )
         check_speed(path.path, path.step, spacing, fps)
+        # A particle that a held box cuts is held as firmly as a whole one: the box's plane is.
+        whole = held * np.maximum(1.0, np.median(self.body.volume) / self.body.volume)
+        path = replace(path, share=np.maximum(path.share, whole))
+        inertia = self._held_motion(whole)
         # Tissue that cannot be squeezed pushes on its base far harder than it shears it.
-        if firm:
-            path.stiffness[0] *= max(1.0, BASE * pressure**2 / self._held_motion(held) / spring)
+        path.stiffness[0] *= max(1 / max(1.0, inertia), BASE * pressure**2 / inertia / spring if firm else 0.0)
         path = replace(path, share=path.share * self._firmer(self.theta(values, places, held)))
         for name, term in laws.items():
             if term.drive is not None:
@@ -125,7 +130,10 @@ class Prepared:
         return firmer
 
     def _held_motion(self, held: np.ndarray) -> float:
-        """Largest share of any motion's inertia that is held tissue's: what a spring on that counts for in the step."""
+        """Largest share of any motion's inertia that is held tissue's: what a spring on that counts for in the step.
+
+        held: how firmly each particle is, (P,).
+        """
         if not held.any() or isinstance(self.simulator, Updated):
             return 1.0
         root = np.sqrt(self.simulator.node_mass(np.ones(len(held))))

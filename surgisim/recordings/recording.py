@@ -88,9 +88,13 @@ class Recording:
         first = self.visible.argmax(1)
         return self.points[np.arange(len(first)), first].astype(float)
 
-    def body(self, spacing: float) -> Body:
-        """Particles for a grid of `spacing` [m], those in the boxes held."""
-        return fill(self.mesh, spacing=spacing, boxes=self.boxes, where=f"recording {self.name}")
+    def body(self, spacing: float, raised: float = 0.0) -> Body:
+        """Particles for a grid of `spacing` [m], those in the boxes held, which reach `raised` [m] further all round.
+
+        Raises Problem where boxes that are drawn in hold nothing, or raised ones everything.
+        """
+        boxes = self.boxes + raised * np.array([-1.0, 1.0])[:, None]
+        return fill(self.mesh, spacing=spacing, boxes=boxes, where=f"recording {self.name}")
 
 
 def no_grips(frames: int) -> Motion:

@@ -37,11 +37,58 @@ def test_a_constant_of_a_point_is_no_residual(drawn):
     assert np.abs(whiten(constant)).max() < 1e-9
 
 
+def dense(noise, rest, frames):
+    axes, shared, camera = noise.modes(rest)
+    cov = np.einsum("km,mts,lm->ktls", axes, noise.temporal(frames, shared, camera), axes)
+    return cov.reshape(len(rest) * frames, -1) * np.outer(*[np.repeat(noise.level, frames)] * 2)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3])
+def test_missing_samples_are_marginalised_exactly(drawn, share):
+    rest, noise, tracks, _ = drawn
+    rest, tracks, frames = rest[:12], tracks[:12, :20], 20
+    noise = Noise(**{**vars(noise), "level": noise.level[:12]})
+    seen = np.random.default_rng(3).random((12, frames)) > share
+    there = np.flatnonzero(seen)
+    cov = dense(noise, rest, frames)[np.ix_(there, there)]
+    constant = np.kron(np.eye(12), np.ones((frames, 1)))[there]
+    inverse = np.linalg.inv(cov)
+    left = inverse - inverse @ constant @ np.linalg.solve(constant.T @ inverse @ constant, constant.T @ inverse)
+    values = tracks[..., 0].ravel()[there]
+    whiten = whitener(noise, rest, seen)
+    white = whiten(np.where(seen[..., None], tracks, 7e-3)[..., :1] * [1, 0, 0])
+    assert white @ white == pytest.approx(values @ left @ values, rel=1e-4)
+    assert whiten.free == 3 * (seen.sum() - 12)
+
+
+def test_noise_with_gaps_gains_nothing_on_slow_rigid_motions(drawn):
+    rest, noise, _, _ = drawn
+    rng = np.random.default_rng(4)
+    seen = rng.random((50, FRAMES)) > 0.2
+    whiten = whitener(noise, rest, seen)
+    course = np.linspace(0, 1, FRAMES)[None, :, None]
+    columns = whiten(np.stack([np.broadcast_to(course * e, (50, FRAMES, 3)) for e in np.eye(3)])).T
+    gains = []
+    for _ in range(40):
+        b = columns.T @ whiten(np.where(seen[..., None], noise.draw(rest, FRAMES, rng), 0.0))
+        gains.append(b @ np.linalg.solve(columns.T @ columns, b))
+    assert np.mean(gains) == pytest.approx(3, abs=1.4)
+
+
+def test_noise_is_found_where_a_fifth_is_missing(drawn):
+    rest, noise, tracks, _ = drawn
+    seen = np.random.default_rng(6).random((50, FRAMES)) > 0.2
+    found = estimate(np.where(seen[..., None], tracks, 0), seen, rest, np.ones(FRAMES, bool), np.full(50, 2e-4))
+    assert found.sigma == pytest.approx(noise.sigma, rel=0.15)
+    white = whitener(found, rest, seen)
+    assert (white(tracks) ** 2).sum() / white.free == pytest.approx(1.0, abs=0.1)
+
+
 def test_back_is_the_transpose(drawn):
     rest, noise, tracks, seen = drawn
     whiten = whitener(noise, rest, seen)
     other = np.random.default_rng(1).standard_normal(whiten(tracks).shape)
-    assert whiten(tracks) @ other == pytest.approx((whiten.back(other) * tracks).sum(), rel=1e-9)
+    assert whiten(tracks) @ other == pytest.approx((whiten.back(other) * tracks).sum(), rel=1e-6)
 
 
 def test_the_metric_is_the_inverse_of_the_whole_covariance():
