@@ -83,8 +83,10 @@ class JsonArtifact(Artifact):
             raise Problem(f"{path}: has no header, but a {cls.__name__} written by this project is wanted here.")
         _check_kind(cls, header, path)
         names = {f.name for f in dataclasses.fields(cls)}
-        if set(body) != names:
-            wrong = sorted(set(body) ^ names)
+        missing = dataclasses.MISSING
+        needed = {f.name for f in dataclasses.fields(cls) if f.default is missing and f.default_factory is missing}
+        if not needed <= set(body) <= names:
+            wrong = sorted((needed - set(body)) | (set(body) - names))
             raise Problem(f"{path}: a {cls.__name__} has exactly {sorted(names)}; {wrong} do not match.")
         return cls(**body), header
 
