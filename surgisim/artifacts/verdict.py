@@ -52,6 +52,10 @@ class Candidate:
     """Error on the frames held out once it is fitted [mm]."""
 
 
+LARGEST, PULLED = "A", "B"
+"""Markers of where the misfit is largest and of where a pull takes hold that would separate two laws."""
+
+
 @dataclass(frozen=True)
 class Marker:
     """A place that the words, the pictures and the tables call by one number or letter."""

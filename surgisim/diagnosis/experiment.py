@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from surgisim.artifacts.motion import Motion
+from surgisim.artifacts.verdict import PULLED
 from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import places
 from surgisim.diagnosis.hypothesis import ease
 from surgisim.diagnosis.laws import IMPOSSIBLE, Law, respond
-from surgisim.diagnosis.markers import PULLED
 from surgisim.diagnosis.memo import Memo
 from surgisim.estimation.trial import at_once
 

@@ -4,8 +4,7 @@ from typing import Any
 
 import numpy as np
 
-LARGEST, PULLED = "A", "B"
-"""Of the place where the misfit is largest, and of where the pull takes hold that would separate two laws."""
+from surgisim.artifacts.verdict import LARGEST
 
 
 def markers(verdict: str, effects: list[dict[str, Any]], clip, z: np.ndarray) -> list[dict[str, Any]]:

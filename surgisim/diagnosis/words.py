@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from surgisim.artifacts.verdict import LARGEST
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.markers import LARGEST
 
 SAYS = {
     "hidden_contact": ("something unseen pushes the tissue {where} from {onset} to {end}", "a push there ({amount})"),

@@ -10,7 +10,7 @@ import numpy as np
 
 from surgisim.artifacts.base import load
 from surgisim.artifacts.mismatch import Mismatch
-from surgisim.artifacts.verdict import Marker, Verdict, read_verdict
+from surgisim.artifacts.verdict import PULLED, Marker, Verdict, read_verdict
 from surgisim.problem import Problem
 from surgisim.recordings.folder import read_recording
 from surgisim.recordings.recording import Recording
@@ -91,8 +91,6 @@ def read(recording: Path, diagnosis: Path, mismatch: Path, physics: Path) -> Dia
     return Diagnosed(clip, verdict, left, json.loads(physics.read_text()), told.get("experiment") or _pull(verdict))
 
 
-PULLED = "B"
-"""Letter of where a separating experiment takes hold; the largest misfit is A."""
 PULL = re.compile(r"(?:near|at \w+) \(([-\d., ]+?)(?:\) mm| mm\)), pull ([\d.]+) mm .*?along \(([-\d., ]+)\)")
 """How a diagnosis words a pull."""
 
