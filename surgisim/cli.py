@@ -119,17 +119,22 @@ def diagnose(
         Path,
         typer.Option(help="Folder for diagnosis.html, diagnosis.json, physics.json, mismatch.npz and mismatch.ply."),
     ],
-    set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A setting; repeatable.")] = None,
+    config: Config = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="A key of config.yaml's section 'diagnosis'; repeatable."),
+    ] = None,
     debug: Debug = False,
 ) -> None:
     """Say what physics a recording's simulation lacks, and how surely; a second start goes on where one stopped."""
     from surgisim.artifacts.base import save_bytes
     from surgisim.diagnosis.files import carry_out
+    from surgisim.order import of_diagnosis
     from surgisim.report.diagnosed.case import read
     from surgisim.report.diagnosed.page import page
 
     with plain_errors(debug):
-        typer.echo(carry_out(recording, out, tuple(set_ or ())))
+        typer.echo(carry_out(recording, out, of_diagnosis(tuple(config or ()), tuple(set_ or ()))))
         files = (out / name for name in ("diagnosis.json", "mismatch.npz", "physics.json"))
         save_bytes({out / "diagnosis.html": page(read(recording, *files), progress=Progress("page"))})
         typer.echo(f"{out / 'diagnosis.html'} shows it.")

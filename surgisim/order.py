@@ -16,6 +16,7 @@ from surgisim.artifacts.fit import Fit
 from surgisim.artifacts.verdict import read_verdict
 from surgisim.clips import EMBEDDED, merge_entry, value
 from surgisim.config.base import parse
+from surgisim.config.diagnosis import Diagnosing
 from surgisim.config.whole import PARENTS, Whole, rooted
 from surgisim.follow import follower
 from surgisim.launch import State, home, launch, why
@@ -110,6 +111,12 @@ def chosen(configs: tuple[Path, ...], settings: tuple[str, ...]) -> dict[str, An
         parse(Whole, one, f"--set {entry}")
         total = merged(total, rooted(one, Path.cwd()))
     return total
+
+
+def of_diagnosis(configs: tuple[Path, ...], settings: tuple[str, ...]) -> Diagnosing:
+    """How a recording is diagnosed, of the same files and flags; a flag may leave out the section's name."""
+    keys = (entry if entry.startswith("diagnosis.") else f"diagnosis.{entry}" for entry in settings)
+    return parse(Whole, chosen(configs, tuple(keys)), "diagnose").diagnosis
 
 
 def _recording(clip: str) -> str:

@@ -12,7 +12,7 @@ import yaml
 
 from surgisim.clips import Clip, read_clips
 from surgisim.config.base import parse
-from surgisim.config.whole import NAME, PARENTS, Choices, Whole, rooted
+from surgisim.config.whole import NAME, ON_REQUEST, PARENTS, Choices, Whole, rooted
 from surgisim.problem import Problem
 
 OWN = ("evaluation", "report")
@@ -27,14 +27,17 @@ class Plan:
     variants: tuple[str, ...]
     """Variants that could be run, the main one first."""
     slices: dict[tuple[str, str, str], str]
-    """(stage, clip, variant) -> the stage's own settings and nothing else, as JSON."""
+    """(stage, clip, variant) -> the stage's own settings and nothing else, as JSON; also of stages on request."""
     homes: dict[tuple[str, str, str], str]
     """(stage, clip, variant) -> the first variant whose settings agree this far: the stage's output lies there."""
+    choices: Choices
+    """The config itself, for work on what is no clip."""
 
 
 def plan(config: Mapping[str, Any], *, clips: Path, variants: Path) -> Plan:
     """Read both tables, merge and check everything. What a variant changes wins over the clip, the clip over config."""
-    run = parse(Whole, dict(config), "config").run
+    choices = parse(Whole, dict(config), "config")
+    run = choices.run
     rows = read_clips(clips)
     overrides = read_variants(variants)
     unknown = [v for v in run if v not in overrides]
@@ -57,17 +60,19 @@ def plan(config: Mapping[str, Any], *, clips: Path, variants: Path) -> Plan:
             reach: dict[str, str] = {}
             for stage, shared in known[key].items():
                 mine = shared if stage not in OWN else _named(shared, clip=name, variant=variant)
-                reach[stage] = _digest(mine, *(reach[p] for p in PARENTS[stage] if p in reach))
                 slices[stage, name, variant] = mine
+                if stage in ON_REQUEST:
+                    continue
+                reach[stage] = _digest(mine, *(reach[p] for p in PARENTS[stage] if p in reach))
                 homes[stage, name, variant] = (
                     variant if stage in OWN else first.setdefault((stage, reach[stage]), variant)
                 )
-    return Plan(rows, run, tuple(overrides), slices, homes)
+    return Plan(rows, run, tuple(overrides), slices, homes, choices)
 
 
 def _slices(settings: Choices) -> dict[str, str]:
     whole = settings.model_dump(mode="json")
-    return {stage: json.dumps(whole.get(stage, {}), sort_keys=True) for stage in PARENTS}
+    return {stage: json.dumps(whole.get(stage, {}), sort_keys=True) for stage in (*PARENTS, *ON_REQUEST)}
 
 
 def _named(settings: str, **names: str) -> str:

@@ -5,6 +5,7 @@ with which settings and which code. Nothing in it depends on the clock or the ma
 the same work writes the same bytes.
 """
 
+import contextlib
 import dataclasses
 import io
 import json
@@ -16,6 +17,7 @@ from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
+from surgisim.artifacts.partial import clear_left, partial
 from surgisim.problem import Problem
 
 HEADER = "__header__"
@@ -81,8 +83,10 @@ class JsonArtifact(Artifact):
             raise Problem(f"{path}: has no header, but a {cls.__name__} written by this project is wanted here.")
         _check_kind(cls, header, path)
         names = {f.name for f in dataclasses.fields(cls)}
-        if set(body) != names:
-            wrong = sorted(set(body) ^ names)
+        missing = dataclasses.MISSING
+        needed = {f.name for f in dataclasses.fields(cls) if f.default is missing and f.default_factory is missing}
+        if not needed <= set(body) <= names:
+            wrong = sorted((needed - set(body)) | (set(body) - names))
             raise Problem(f"{path}: a {cls.__name__} has exactly {sorted(names)}; {wrong} do not match.")
         return cls(**body), header
 
@@ -120,29 +124,25 @@ def load(kind: type[A], path: Path) -> A:
 def save_bytes(files: Mapping[Path, bytes]) -> None:
     """Write several files under temporary names, flush them to the disk, then rename them all.
 
-    If anything fails before the renames (a full disk, say), no file of the set appears.
+    If anything fails before the renames (a full disk, say), no file of the set appears. Others may write the same
+    files at the same time: each writes its own, and the last one stays.
     """
     waiting: dict[Path, Path] = {}
-    try:
+    with contextlib.ExitStack() as writing:
         for path, content in files.items():
             path.parent.mkdir(parents=True, exist_ok=True)
-            for left in path.parent.glob(f".{path.name}.*.part"):
-                left.unlink()  # by a process that was killed in mid-write
-            temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-            waiting[temporary] = path
+            clear_left(path)
             try:
-                with open(temporary, "wb") as stream:
-                    stream.write(content)
-                    stream.flush()
-                    os.fsync(stream.fileno())
+                stream = writing.enter_context(partial(path))
+                waiting[Path(stream.name)] = path
+                stream.write(content)
+                stream.flush()
+                os.fsync(stream.fileno())
             except OSError as error:
                 error.filename = str(path)
                 raise
         for temporary, path in waiting.items():
             os.replace(temporary, path)
-    finally:
-        for temporary in waiting:
-            temporary.unlink(missing_ok=True)
 
 
 def _check_kind(kind: type, header: Mapping[str, Any], path: Path) -> None:

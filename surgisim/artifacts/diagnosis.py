@@ -1,6 +1,6 @@
 """What a diagnosis says of a recording; the fields are those of format surgisim-diagnosis/1 (docs/diagnosis.md)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from surgisim.artifacts.base import JsonArtifact, check
@@ -33,6 +33,20 @@ class Diagnosis(JsonArtifact):
     global_test: dict[str, Any]
     """Evidence of the best law, what nulls reach, and the threshold."""
     format: str = "surgisim-diagnosis/1"
+    frame: str = "recording"
+    """Frame of every place and direction here, in physics.json and in mismatch: that of the recording's own files."""
+    axes: dict[str, Any] = field(default_factory=lambda: {"names": ["x", "y", "z"], "unit": "m"})
+    """What the three numbers of a place are, in their order; `words` gives them in mm."""
+    markers: list[dict[str, Any]] = field(default_factory=list)
+    """What `words` and the page call a place by: mark ("1", "2", ... of an effect, "A" of the largest misfit), of,
+    center, unit, and where known extent and time [s]."""
+    nuisances: list[dict[str, Any]] = field(default_factory=list)
+    """Each with name, value, sd, unit, and said: whether the recording says more of it than was assumed."""
+    goodness: dict[str, Any] = field(default_factory=dict)
+    """per_frame: chi square over its degrees of freedom, one number or null a frame, with what is named; degrees: those
+    degrees of freedom, one number or one a frame."""
+    untold: list[str] = field(default_factory=list)
+    """Parameters that end at a bound of what was tried: this recording does not tell them."""
 
     def __post_init__(self) -> None:
         check(self.verdict in VERDICTS, f"Diagnosis: verdict '{self.verdict}' is none of {VERDICTS}.")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from surgisim.artifacts.goodness import Goodness, Nuisance, goodness, nuisances, untold
 from surgisim.problem import Problem
 
 FORMAT = "surgisim-diagnosis/1"
@@ -51,6 +52,25 @@ class Candidate:
     """Error on the frames held out once it is fitted [mm]."""
 
 
+LARGEST, PULLED = "A", "B"
+"""Markers of where the misfit is largest and of where a pull takes hold that would separate two laws."""
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A place that the words, the pictures and the tables call by one number or letter."""
+
+    mark: str
+    of: str
+    """A law's name, or what else is there."""
+    center: tuple[float, float, float]
+    """In the recording's frame [m]."""
+    extent: float | None = None
+    """Radius about the centre [m]."""
+    time: float | None = None
+    """[s]"""
+
+
 @dataclass(frozen=True)
 class Verdict:
     recording: str
@@ -68,6 +88,11 @@ class Verdict:
     unexplained: float | None
     """Share of the whitened misfit that nothing named explains [1]."""
     words: str
+    markers: tuple[Marker, ...] = ()
+    nuisances: tuple[Nuisance, ...] = ()
+    goodness: Goodness | None = None
+    untold: tuple[str, ...] = ()
+    """Parameters at a bound of what was tried."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -100,6 +125,10 @@ def read_verdict(path: Path) -> Verdict:
         _errors(body.get("held_out"), f"{path}: held_out"),
         body.get("unexplained_fraction"),
         str(body.get("words", "")),
+        _markers(body.get("markers"), effects, path),
+        nuisances(body, str(path)),
+        goodness(body, str(path)),
+        untold(body),
     )
 
 
@@ -127,6 +156,23 @@ def _effect(raw: Any, where: str) -> Effect:
         others,
         str(raw.get("separating_experiment") or ""),
     )
+
+
+def _markers(raw: Any, effects: tuple[Effect, ...], path: Path) -> tuple[Marker, ...]:
+    """As given; effects are numbered where none are, as in files that were written before."""
+    if raw is None:
+        numbered = enumerate(effects, 1)
+        return tuple(Marker(str(n), e.term, e.center, e.extent, e.onset) for n, e in numbered if e.center)
+    result = []
+    for i, each in enumerate(raw):
+        where = f"{path}: marker {i}"
+        if not isinstance(each, dict) or not {"mark", "of", "center"} <= each.keys():
+            raise Problem(f"{where}: 'mark', 'of' and 'center' are wanted. Diagnose anew.")
+        center, extent = _place(each, where)
+        if center is None:
+            raise Problem(f"{where}: its centre is missing. Diagnose anew.")
+        result.append(Marker(str(each["mark"]), str(each["of"]), center, extent, each.get("time")))
+    return tuple(result)
 
 
 def _candidate(raw: Any, where: str) -> Candidate:

@@ -15,21 +15,21 @@ Kinds = Literal[
 
 
 class Diagnosing(Settings):
-    """What is tried, and how noise is taken into account."""
+    """What the simulation lacks, where that is asked for: what is tried, and how noise is taken into account."""
 
     seed: int = Field(0, ge=0)
-    """Of the simulated nulls and of whatever else is drawn [1]."""
+    """Seed of the simulated nulls and of whatever else is drawn [1]."""
     grid: float = Field(0.165, gt=0.04, le=0.5)
     """Spacing of the grid over the cube root of the body's volume [1]."""
     replay: float = Field(0.13, gt=0.04, le=0.5)
     """The same of the runs whose errors are shown, before and after, and of a second search where the first sees that
-    something is hidden and not what; neither is made where it is no finer [1]."""
+    something is hidden and not what; neither is made where it is no finer than `grid` [1]."""
     nulls: int = Field(24, ge=4, le=400)
     """Residuals of nothing but noise that go through the same search [1]."""
     refine: int = Field(4, ge=1, le=16)
     """Laws that the engine itself runs again, best first [1]."""
     free: int = Field(3, ge=0, le=16)
-    """Of them, laws that are fitted at most with place, time, form and base free [1]."""
+    """Of those, laws that are fitted at most with place, time, form and base free [1]."""
     budget: float = Field(5e9, gt=0)
     """Particles times steps that those fits take together, roughly: where bodies are large, clips long or tissue so
     viscous that steps are short, fewer laws are fitted that way, or none [1]."""

@@ -34,6 +34,9 @@ PARENTS = MappingProxyType(
 )
 """The stages in order, each with those whose settings reach it (through their own parents too)."""
 
+ON_REQUEST = MappingProxyType({"diagnosis": "Diagnosing"})
+"""Stages that run only where they are asked for, each with the name of its settings model."""
+
 
 class Choices(Settings):
     """What is run, and how."""
@@ -44,11 +47,11 @@ class Choices(Settings):
 
 def group(stage: str) -> type[Settings]:
     """The settings model of one stage."""
-    return getattr(importlib.import_module(f"surgisim.config.{stage}"), stage.capitalize())
+    return getattr(importlib.import_module(f"surgisim.config.{stage}"), ON_REQUEST.get(stage, stage.capitalize()))
 
 
 def _whole() -> type[Choices]:
-    groups = [s for s in PARENTS if Path(__file__).with_name(f"{s}.py").is_file()]
+    groups = [s for s in (*PARENTS, *ON_REQUEST) if Path(__file__).with_name(f"{s}.py").is_file()]
     fields: dict[str, Any] = {s: (group(s), Field(default_factory=group(s))) for s in groups}
     return create_model("Whole", __base__=Choices, __doc__="Every choice of a run.", **fields)
 

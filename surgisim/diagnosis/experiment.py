@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from surgisim.artifacts.motion import Motion
+from surgisim.artifacts.verdict import PULLED
 from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import places
@@ -74,8 +75,7 @@ def pulls(clip: Clip, rng: np.random.Generator) -> list[tuple[str, Motion]]:
             motion = Motion(center[None], np.array([radius]), path[None], active, np.ones(1), "given")
             at = ", ".join(f"{1e3 * c:.0f}" for c in center)
             along = ", ".join(f"{c:.2f}" for c in way)
-            text = (
-                f"Grasp near ({at}) mm, pull {1e3 * length:.0f} mm {name} along ({along}), hold {HOLD:g} s and release"
-            )
+            pull = f"pull {1e3 * length:.0f} mm {name} along ({along})"
+            text = f"Grasp at {PULLED} ({at} mm), {pull}, hold {HOLD:g} s and release"
             result.append((text, motion))
     return result

@@ -1,20 +1,16 @@
 """What a diagnosis keeps between starts, and its coloured points."""
 
 import hashlib
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from surgisim.artifacts.base import encoded, save_bytes
 from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.ply import write_ply
-from surgisim.config.base import parse
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis.memo import Memo
 from surgisim.digest import digest
-from surgisim.problem import Problem
 from surgisim.recordings.folder import read_recording
 from surgisim.stage import Progress
 
@@ -48,11 +44,10 @@ def cloud(mismatch: Mismatch) -> bytes:
     return write_ply(columns, {"kind": "Cause"})
 
 
-def carry_out(recording: Path, out: Path, sets: tuple[str, ...]) -> str:
-    """Diagnose a folder into another; `sets` are KEY=VALUE. Returns the verdict in words."""
+def carry_out(recording: Path, out: Path, settings: Diagnosing) -> str:
+    """Diagnose a folder into another. Returns the verdict in words."""
     from surgisim.diagnosis.diagnose import diagnose
 
-    settings = parse(Diagnosing, dict(map(_pair, sets)), "diagnose")
     made = diagnose(
         read_recording(recording), settings, Progress("diagnosis"), memo_for(recording, settings, out / "work")
     )
@@ -63,13 +58,3 @@ def carry_out(recording: Path, out: Path, sets: tuple[str, ...]) -> str:
     }
     save_bytes(files | {out / "mismatch.ply": cloud(made[2])})
     return f"{made[0].verdict}: {made[0].words}"
-
-
-def _pair(said: str) -> tuple[str, Any]:
-    key, equals, value = said.partition("=")
-    if not equals:
-        raise Problem(f"--set {said}: a setting is written KEY=VALUE.")
-    try:
-        return key, json.loads(value)
-    except json.JSONDecodeError:
-        return key, value

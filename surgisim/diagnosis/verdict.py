@@ -17,6 +17,7 @@ from surgisim.diagnosis.experiment import separating
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import described, law_of
 from surgisim.diagnosis.locate import cause, of_places, symptom
+from surgisim.diagnosis.markers import largest, markers
 from surgisim.diagnosis.model import base_numbers, physics
 from surgisim.diagnosis.noise import Noise, estimate
 from surgisim.diagnosis.placebo import placebo
@@ -157,6 +158,7 @@ def write(
         held_out=held_out,
         unexplained_fraction=float(np.clip(1 - explained, 0, 1)) if verdict != "nothing detectable" else 0.0,
         words=said,
+        markers=markers(verdict, effects, clip, z),
         base=base_numbers(base),
         noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(noise).items()}
         | {"sigma": noise.sigma, "unit": "m"},
@@ -389,10 +391,12 @@ def _words(case, said_of: Judgement, refits, laws, z, held_out: dict) -> str:
         later = (before, noise) if before is not None and before > calibration.SHOWS * noise else None
         return words.nothing(1e-3 * detectable(case, laws)[0], later)
     if verdict == "unexplained" and draws(said_of.shares) and said_of.shares["left"] <= calibration.PUSH_LEAVES:
-        return words.drawn(max(pushes(case.clip.recording, said_of.accepted), key=lambda push: push[0])[1])
+        push = max(pushes(case.clip.recording, said_of.accepted), key=lambda push: push[0])[1]
+        number = next(n for n, r in enumerate(said_of.accepted, 1) if r.finding.hypothesis is push)
+        return words.drawn(push, number)
     if verdict == "unexplained":
         best = refits[0].term
-        k, t = np.unravel_index(np.argmax(z[:, : case.clip.until]), (len(z), case.clip.until))
+        k, t = largest(z, case.clip.until)
         when = f"at {t / case.clip.fps:.2g} s ({PHASES[case.clip.phases()[t]]})"
         where = case.clip.rest[k].tolist()
         if beaten(said_of.shares):

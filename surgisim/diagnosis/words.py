@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from surgisim.artifacts.verdict import LARGEST
 from surgisim.diagnosis.hypothesis import Hypothesis
 
 SAYS = {
@@ -29,7 +30,7 @@ READ_IN = {"1": (1.0, ""), "kg": (1e3, " g")}
 
 def sentence(found: Sequence[tuple[Hypothesis, dict[str, dict], float]], gained: float) -> str:
     """What is seen, and what naming it gains; found: laws, their parameters, and their sizes [m]."""
-    told = [(*_told(h, parameters), 1e3 * size) for h, parameters, size in found]
+    told = [(*_told(h, parameters, number), 1e3 * size) for number, (h, parameters, size) in enumerate(found, 1)]
     seen = ", and that ".join(f"{what} ({size:.2g} mm RMS)" for what, _, size in told)
     added = " and ".join(law for _, law, _ in told)
     removes = "removes" if len(told) == 1 else "together remove"
@@ -39,10 +40,10 @@ def sentence(found: Sequence[tuple[Hypothesis, dict[str, dict], float]], gained:
     )
 
 
-def _told(h: Hypothesis, parameters: dict[str, dict]) -> tuple[str, str]:
-    """What a law makes tissue do, and what it is."""
+def _told(h: Hypothesis, parameters: dict[str, dict], number: int) -> tuple[str, str]:
+    """What a law makes tissue do, and what it is; number: its marker's."""
     seen, law = SAYS[h.term]
-    where = "" if h.place is None else _near(h.place.center)
+    where = "" if h.place is None else _at(number, h.place.center)
     amount = ""
     if parameters:
         name, first = next(iter(parameters.items()))
@@ -70,8 +71,8 @@ def nothing(above: float, later: tuple[float, float] | None = None) -> str:
 
 def unexplained(best: str, left: float, when: str, where: list[float]) -> str:
     return (
-        f"The recording departs from its simulation, most of all {_near(where)} {when}, and no law tried explains it: "
-        f"{best} comes nearest and leaves {100 * left:.0f} % of it. "
+        f"The recording departs from its simulation, most of all {_at(LARGEST, where)} {when}, "
+        f"and no law tried explains it: {best} comes nearest and leaves {100 * left:.0f} % of it. "
         "What is missing is not in the catalogue, or more than one thing."
     )
 
@@ -89,22 +90,23 @@ def idle(best: str, when: str, where: list[float]) -> str:
 
 def _unbelieved(best: str, when: str, where: list[float], why: str) -> str:
     return (
-        f"The recording departs from its simulation, most of all {_near(where)} {when}, and {best} comes nearest. "
-        f"It is not named, because {why}."
+        f"The recording departs from its simulation, most of all {_at(LARGEST, where)} {when}, "
+        f"and {best} comes nearest. It is not named, because {why}."
     )
 
 
-def drawn(h: Hypothesis) -> str:
-    """h: a push that points out of the tissue."""
+def drawn(h: Hypothesis, number: int = 1) -> str:
+    """h: a push that points out of the tissue; number: its marker's."""
     return (
-        f"Something unseen draws the tissue out of its surface {_near(h.place.center)} from {_moment(h.onset)} to "
-        f"{_moment(h.end)}; a contact could only press on it, and no law of the catalogue does that. "
+        f"Something unseen draws the tissue out of its surface {_at(number, h.place.center)} from {_moment(h.onset)} "
+        f"to {_moment(h.end)}; a contact could only press on it, and no law of the catalogue does that. "
         "A second grip or a stitch that was not recorded would; mark it as a grip and diagnose again."
     )
 
 
-def _near(where: Sequence[float]) -> str:
-    return f"near ({', '.join(f'{1e3 * c:.0f}' for c in where)}) mm"
+def _at(mark: int | str, where: Sequence[float]) -> str:
+    """A place by its marker and where it is in the recording's frame; where: [m]."""
+    return f"at {mark} ({', '.join(f'{1e3 * c:.0f}' for c in where)} mm)"
 
 
 def _moment(seconds: float | None) -> str:

@@ -10,6 +10,9 @@ from pathlib import Path
 import psutil
 import pytest
 
+from surgisim.order import of_diagnosis
+from surgisim.problem import Problem
+
 
 def sentence(done: subprocess.CompletedProcess) -> str:
     """The one line that says what went wrong."""
@@ -48,6 +51,7 @@ def test_a_missing_recording_is_one_sentence(tree):
         (["--set", "ingest.sise=3"], "did you mean 'size'"),
         (["--set", "ingest.size"], "STAGE.KEY=VALUE is wanted"),
         (["--set", "ingest.size=wide"], "key 'ingest.size' is 'wide'"),
+        (["--set", "diagnosis.fre=0"], "there is no key 'diagnosis.fre'; did you mean 'free'?"),
         (["--variant", "elastc"], "elastc"),
         (["--until", "maskin"], "did you mean 'masking'"),
         (["--profile", "cloud"], "known by name: default, gpu, slurm"),
@@ -106,6 +110,24 @@ def test_a_clip_may_be_diagnosed_too(tree):
     added = {line for line in done.stdout.splitlines() if "diagnosis" in line or "recorded" in line}
     assert added == {f"would run {job} mine/main" for job in ("recorded", "clip_diagnosis", "clip_diagnosis_report")}
     assert "would run report mine/main" in done.stdout
+
+
+def test_settings_of_a_diagnosis_are_passed_as_all_others(tree):
+    (tree.root / "mine.yaml").write_text("diagnosis: {second: false}\n")
+    chosen = ("--config", "mine.yaml", "--set", "diagnosis.free=0")
+    done = tree.surgisim("run", "phantom", "--out", "there", "--diagnose", *chosen, "-n")
+    assert done.returncode == 0
+    assert "would run clip_diagnosis" in done.stdout
+    assert "free: 0\n  second: false" in (tree.root / "there" / "results" / "run.yaml").read_text()
+
+
+def test_the_settings_of_a_recordings_diagnosis_may_leave_out_the_sections_name(tmp_path):
+    (tmp_path / "mine.yaml").write_text("diagnosis: {second: false, free: 2}\n")
+    for key in ("free", "diagnosis.free"):
+        chosen = of_diagnosis((tmp_path / "mine.yaml",), (f"{key}=0", "model_error=0.5"))
+        assert (chosen.free, chosen.second, chosen.model_error) == (0, False, 0.5)
+    with pytest.raises(Problem, match=r"there is no key 'diagnosis\.fre'; did you mean 'free'"):
+        of_diagnosis((), ("fre=0",))
 
 
 def test_a_package_without_its_checkout_says_what_to_do(tree, tmp_path, monkeypatch):

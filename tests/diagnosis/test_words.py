@@ -1,9 +1,12 @@
 """What is named is said in two sentences."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.words import beaten, idle, nothing, sentence
+from surgisim.diagnosis.markers import markers
+from surgisim.diagnosis.words import beaten, drawn, idle, nothing, sentence
 from surgisim.physics.place import Place
 
 PUSH = Hypothesis("hidden_contact", np.eye(3), 0, Place((-0.022, -0.007, 0.003), 0.003), 0.48, 1.2)
@@ -16,7 +19,7 @@ def of(name, value, unit):
 
 def test_one_law_is_said_with_its_place_and_its_number():
     said = sentence([(PUSH, of("force", 0.2, "N"), 7e-4)], 0.93)
-    assert "pushes the tissue near (-22, -7, 3) mm from 0.48 s to 1.2 s (0.7 mm RMS)" in said
+    assert "pushes the tissue at 1 (-22, -7, 3 mm) from 0.48 s to 1.2 s (0.7 mm RMS)" in said
     assert "a push there (force = 0.2 N, 0.16 to 0.24) removes 93 %" in said
 
 
@@ -25,6 +28,22 @@ def test_two_laws_are_both_said():
     assert "one direction (0.3 mm RMS)" in said
     assert "strands in that direction (k1 = 4e+03 Pa, 3.2e+03 to 4.8e+03) together remove 98 %" in said
     assert said.count(". ") == 1
+
+
+def test_places_have_the_numbers_of_their_effects():
+    said = sentence([(STRANDS, of("k1", 4e3, "Pa"), 3e-4), (PUSH, of("force", 0.2, "N"), 7e-4)], 0.98)
+    assert "at 2 (-22, -7, 3 mm)" in said
+    assert "at 2 (-22, -7, 3 mm) from 0.48 s to 1.2 s; a contact" in drawn(PUSH, 2)
+    effects = [
+        {"term": "fibre", "place": "everywhere"},
+        {"term": "hidden_contact", "place": {"center": [-0.022, -0.007, 0.003], "extent": 0.003, "unit": "m"}},
+    ]
+    clip = SimpleNamespace(rest=np.array([[0.0, 0, 0], [0.01, 0, 0.002]]), until=3, fps=10.0)
+    z = np.array([[1.0, 2, 1, 9], [1, 1, 3, 1]])
+    second, worst = markers("named", effects, clip, z)
+    assert second == {"mark": "2", "of": "hidden_contact"} | effects[1]["place"]
+    assert worst == {"mark": "A", "of": "largest misfit", "center": [0.01, 0.0, 0.002], "unit": "m", "time": 0.2}
+    assert markers("nothing detectable", [], clip, z) == []
 
 
 def test_a_number_without_a_unit_is_said_without_one():
@@ -49,7 +68,7 @@ def test_nothing_found_says_where_later_frames_differ_all_the_same():
 
 def test_a_law_that_a_placebo_beats_is_said_not_to_be_named():
     said = beaten("stiff_inclusion", -0.02, "at 0.8 s (hold)", [0.01, 0.0, 0.002])
-    assert "near (10, 0, 2) mm at 0.8 s (hold), and stiff_inclusion comes nearest. " in said
+    assert "most of all at A (10, 0, 2 mm) at 0.8 s (hold), and stiff_inclusion comes nearest. " in said
     assert said.endswith("a placebo foretells the manipulation held out better, by 0.02 um RMS.")
 
 

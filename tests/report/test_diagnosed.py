@@ -17,8 +17,10 @@ from surgisim.artifacts.verdict import Effect
 from surgisim.physics.catalogue import catalogue
 from surgisim.problem import Problem
 from surgisim.report.diagnosed.case import read
+from surgisim.report.diagnosed.goodness import band
 from surgisim.report.diagnosed.laws import law, told
 from surgisim.report.diagnosed.page import page
+from surgisim.report.diagnosed.sides import sides
 
 EXPERIMENT = {"center": [0.03, 0.03, 0.02], "pull": [0.0, 0.004, 0.007]}
 VERDICTS = {
@@ -79,14 +81,74 @@ def test_the_named_law_is_shown_with_its_equation_and_numbers(tmp_path):
         assert words in text, words
 
 
-def test_a_pull_in_words_is_drawn(tmp_path):
-    words = (
-        "Grasp near (30, 30, 20) mm, pull 5 mm up along (0.00, 0.60, 0.80), hold 1.2 s and release: they would differ."
-    )
+@pytest.mark.parametrize("at", ["at B (30, 30, 20 mm)", "near (30, 30, 20) mm"])
+def test_a_pull_in_words_is_drawn(tmp_path, at):
+    words = f"Grasp {at}, pull 5 mm up along (0.00, 0.60, 0.80), hold 1.2 s and release: they would differ."
     made = made_up.case(tmp_path, told=diagnosis(effects=(named(separating_experiment=words),)))
-    found = read(made / "recording", made / "diagnosis.json", made / "mismatch.npz", made / "physics.json").experiment
-    assert found["center"] == pytest.approx([0.03, 0.03, 0.02])
-    assert found["pull"] == pytest.approx([0.0, 0.003, 0.004])
+    case = read(made / "recording", made / "diagnosis.json", made / "mismatch.npz", made / "physics.json")
+    assert case.experiment["center"] == pytest.approx([0.03, 0.03, 0.02])
+    assert case.experiment["pull"] == pytest.approx([0.0, 0.003, 0.004])
+    assert [(m.mark, m.of) for m in case.markers] == [("1", "stiff_inclusion"), ("B", "the pull that would decide")]
+
+
+MARKERS = [
+    {"mark": "2", "of": "tether", "center": [31.0, 22.0, 14.0], "extent": 7.0, "unit": "mm"},
+    {"mark": "A", "of": "largest misfit", "center": [0.028, 0.027, 0.02], "unit": "m", "time": 1.2},
+]
+
+
+def test_places_have_one_number_everywhere_in_the_recordings_frame(tmp_path):
+    effects = (named("fibre", place="everywhere"), named("tether"))
+    text = shown(tmp_path, diagnosis(effects=effects, markers=MARKERS)).decode()
+    rows = [re.findall(r"[^<>\n]+(?=</)", row) for row in re.findall(r"<tr>(.*?)</tr>", text) if 'class="mark' in row]
+    assert rows[0] == ["2", "tether", "31.0", "22.0", "14.0", "7.0"]
+    assert rows[1] == ["A", "largest misfit", "28.0", "27.0", "20.0", "1.20"]
+    assert "2 (31.0, 22.0, 14.0 mm), radius 7.0 mm" in text
+    assert "in the recording's own frame" in text
+
+
+@pytest.mark.parametrize("up", [(0, 0, 1), (0.1, -0.9, 0.2), (0, 0, -1), (-1, 0, 0)])
+def test_pictures_have_the_axes_of_the_recording_and_mirror_nothing(tmp_path, up):
+    made = made_up.case(tmp_path)
+    case = read(made / "recording", made / "diagnosis.json", made / "mismatch.npz", made / "physics.json")
+    case = replace(case, recording=replace(case.recording, gravity=tuple(-9.81 * np.array(up))))
+    looks = sides(case)
+    for name in ("above", "side"):
+        view, (across, upward, sign) = looks[name].view, looks[name].axes
+        axes = dict(zip("xyz", np.eye(3), strict=True))
+        assert (view.right == axes[across]).all()
+        assert (view.down == -sign * axes[upward]).all()
+        along = axes[looks[name].title[-1]] * (1 if looks[name].title[-2] == "+" else -1)
+        assert (np.cross(view.right, view.down) == along).all()
+    assert looks["side"].view.down @ up < -0.8
+    assert looks["oblique"].axes is None
+
+
+def test_how_well_it_fits_is_shown_where_it_is_told(tmp_path):
+    told = {
+        "nuisances": [{"name": "tracker_lag", "value": 4.2, "sd": 1.1, "unit": "ms", "said": True}],
+        "goodness": {"per_frame": [None, *[1.1] * 23], "degrees": 30},
+        "untold": ["nu", "eta"],
+    }
+    text = shown(tmp_path / "own", diagnosis(**told)).decode()
+    for words in ("How well it fits", "tracker lag", "4.20", "Goodness of fit in time", "<b>nu, eta</b>"):
+        assert words in text, words
+    within = {"goodness": [1.1] * 40, "bounds": ["nu"]}
+    text = shown(tmp_path / "test", diagnosis(global_test=within)).decode()
+    assert "Goodness of fit in time" in text
+    assert "<b>nu</b>" in text
+    assert "How well it fits" not in shown(tmp_path / "none", diagnosis()).decode()
+    with pytest.raises(Problem, match="has 41 frames, but the recording has 40"):
+        shown(tmp_path / "long", diagnosis(goodness=[1.0] * 41))
+
+
+def test_noise_alone_spreads_as_its_degrees_of_freedom_say(tmp_path):
+    made = made_up.case(tmp_path, told=diagnosis(goodness={"per_frame": [1.0] * 24, "degrees": 30}))
+    case = read(made / "recording", made / "diagnosis.json", made / "mismatch.npz", made / "physics.json")
+    low, high = band(case)
+    drawn = (np.random.default_rng(0).standard_normal((20000, 30)) ** 2).mean(1)
+    assert (low[0], high[0]) == pytest.approx(np.quantile(drawn, [0.05, 0.95]), abs=0.02)
+    assert low[-1] < high[-1]
 
 
 def test_held_out_frames_are_marked_also_where_no_split_was_given(tmp_path):

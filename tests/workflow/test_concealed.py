@@ -80,6 +80,12 @@ def test_a_mistake_in_what_is_invented_is_one_sentence(tree):
     assert "there is no key 'pionts'; did you mean 'points'?" in tree.says("--dry-run", "blind")
 
 
+@pytest.mark.parametrize("target", ["blind", "blind_real"])
+def test_a_mistake_in_the_settings_of_a_diagnosis_is_one_sentence(tree, target):
+    tree.choices = {"cases": 1, "seed": 5, "diagnosis": {"fre": 0}}
+    assert "there is no key 'diagnosis.fre'; did you mean 'free'?" in tree.says("--dry-run", target)
+
+
 @pytest.mark.slow
 def test_a_run_is_invented_sealed_diagnosed_opened_and_scored(tmp_path):
     for name in ("surgisim", "stages", "workflow", "config", "envs"):

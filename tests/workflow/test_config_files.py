@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 import yaml
 
-from surgisim.config.whole import PARENTS, Whole, files, group, schemas
+from surgisim.config.whole import ON_REQUEST, PARENTS, Whole, files, group, schemas
 
 ROOT = Path(__file__).parents[2]
 
@@ -51,7 +51,7 @@ def test_no_schema_object_allows_extra_keys():
         assert all(found["additionalProperties"] is False for found in objects(schema))
 
 
-@pytest.mark.parametrize("stage", PARENTS)
+@pytest.mark.parametrize("stage", [*PARENTS, *ON_REQUEST])
 def test_every_setting_says_what_it_is_and_ends_in_its_unit(stage):
     for name, field in group(stage).model_fields.items():
         assert re.search(r"\[[^\]]+\]\.?$", field.description or ""), f"{stage}.{name}: {field.description}"

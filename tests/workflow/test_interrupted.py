@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from surgisim.artifacts.base import save_bytes
+from surgisim.artifacts.partial import partial
+
 STAGE = Path(__file__).with_name("small_stage.py")
 
 
@@ -28,6 +31,43 @@ def test_killed_before_a_rename_and_started_again_gives_the_same_bytes(tmp_path,
     # The settings are part of the header, and the kill was one of them: compare with the undisturbed run.
     for name in ("first.npz", "second.npz"):
         assert (shaken / name).read_bytes() == (calm / name).read_bytes()
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from surgisim.artifacts.partial import partial
+with partial(Path(sys.argv[1])) as stream:
+    print(stream.name, flush=True)
+    sys.stdin.read()
+    stream.write(b"theirs")
+    Path(stream.name).rename(sys.argv[1])
+"""
+
+
+@pytest.mark.parametrize("killed", [False, True])
+def test_what_another_process_is_writing_stays_until_it_is_done_or_dead(tmp_path, killed):
+    path = tmp_path / "run.npz"
+    command = [sys.executable, "-c", WRITER, str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        under_way = Path(other.stdout.readline().strip())
+        save_bytes({path: b"mine"})
+        assert path.read_bytes() == b"mine"
+        assert under_way.is_file()
+        if killed:
+            other.kill()
+        other.stdin.close()
+        other.wait(30)
+    assert path.read_bytes() == (b"mine" if killed else b"theirs")
+    assert under_way.is_file() == killed
+    save_bytes({path: b"mine"})
+    assert os.listdir(tmp_path) == ["run.npz"]
+
+
+def test_two_writers_of_one_process_write_two_files(tmp_path):
+    with partial(tmp_path / "run.npz") as first, partial(tmp_path / "run.npz") as second:
+        assert first.name != second.name
+    assert os.listdir(tmp_path) == []
 
 
 @pytest.fixture

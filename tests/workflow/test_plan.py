@@ -41,6 +41,15 @@ def test_a_variant_that_does_not_fit_is_named(tables):
     assert "did you mean 'trajectory'" in said
 
 
+def test_a_variant_may_change_the_diagnosis_and_shares_everything_else(tables):
+    todo = tables(variants="main: {}\nplain: {diagnosis: {offsets: false}}\n", config={"diagnosis": {"free": 1}})
+    main, plain = (json.loads(todo.slices["diagnosis", "demo", variant]) for variant in ("main", "plain"))
+    assert (main["free"], main["offsets"]) == (1, True)
+    assert plain == main | {"offsets": False}
+    assert todo.homes["simulation", "demo", "plain"] == "main"
+    assert "did you mean 'offsets'" in says(tables, variants="main: {}\nplain: {diagnosis: {ofsets: false}}\n")
+
+
 def test_a_variant_asked_for_that_does_not_exist_is_named(tables):
     assert "elastc" in says(tables, config={"run": ["elastc"]})
 

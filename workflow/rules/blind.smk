@@ -143,13 +143,15 @@ rule diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=lambda w: json.dumps({**config.get("diagnosis", {}), **WAYS[w.way]}),
+        settings=diagnosing,
+        work=work,
         code=code("diagnosis"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
         " --recording {params.recording} --diagnosis {output.diagnosis} --physics {output.physics}"
-        " --mismatch {output.mismatch} --cloud {output.cloud} --work blind/{wildcards.seed}/{wildcards.case}/{wildcards.way}/work"
+        " --mismatch {output.mismatch} --cloud {output.cloud} --work {params.work}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        " && rm -rf {params.work}"
 
 
 rule diagnosis_report:

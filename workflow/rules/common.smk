@@ -9,6 +9,7 @@ ROOT = Path(workflow.basedir).parent
 sys.path.insert(0, str(ROOT))
 
 from surgisim.config.base import parse as checked
+from surgisim.config.diagnosis import Diagnosing
 from surgisim.config.invent import Invent
 from surgisim.config.whole import PARENTS
 from surgisim.digest import digest
@@ -18,7 +19,7 @@ from surgisim.proof.known.catalogue import catalogue as known_recordings
 from surgisim.proof.shuffle import partner
 
 # What the rules for concealed recordings read of the config, beside the clips' choices.
-BLIND = ("seed", "seeds", "cases", "invent", "diagnosis")
+BLIND = ("seed", "seeds", "cases", "invent")
 
 try:
     PLAN = plan(
@@ -158,6 +159,13 @@ def inventing(w):
         raise WorkflowError(str(problem)) from None
 
 
+def diagnosing(w):
+    """Params function: the config's settings of a diagnosis, with what this way or this known recording changes."""
+    changes = WAYS[w.way] if hasattr(w, "way") else KNOWN[w.known].settings
+    told = {**PLAN.choices.diagnosis.model_dump(), **changes}
+    return json.dumps(checked(Diagnosing, told, "diagnosis").model_dump(mode="json"))
+
+
 def shown(w):
     """The files of the recording that this way of diagnosing gets to see."""
     changed = w.way == "shuffled" or w.way in SHORTER
@@ -174,6 +182,12 @@ def others(w):
 def folder(w, input):
     """Params function: where the rule's recording lies."""
     return Path(input.recording[0]).parent
+
+
+def work(w, output):
+    """Params function: where a diagnosis keeps finished runs until it is written."""
+    # Not among the outputs: those of an interrupted job are deleted, and these are what its second start goes on from.
+    return Path(output.diagnosis).parent / "work"
 
 
 def every(pattern):

@@ -62,13 +62,15 @@ rule clip_diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=lambda w: json.dumps(config.get("diagnosis", {})),
+        settings=settings("diagnosis"),
+        work=work,
         code=code("diagnosis"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
         " --recording {params.recording} --diagnosis {output.diagnosis} --physics {output.physics}"
-        " --mismatch {output.mismatch} --cloud {output.cloud}"
+        " --mismatch {output.mismatch} --cloud {output.cloud} --work {params.work}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        " && rm -rf {params.work}"
 
 
 rule clip_diagnosis_report:

@@ -51,15 +51,15 @@ rule known_diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=lambda w: json.dumps(
-            {**config.get("diagnosis", {}), **KNOWN[w.known].settings}
-        ),
+        settings=diagnosing,
+        work=work,
         code=code("diagnosis"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
         " --recording {params.recording} --diagnosis {output.diagnosis} --physics {output.physics}"
-        " --mismatch {output.mismatch} --cloud {output.cloud} --work known/{wildcards.known}/work"
+        " --mismatch {output.mismatch} --cloud {output.cloud} --work {params.work}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        " && rm -rf {params.work}"
 
 
 rule known_report:

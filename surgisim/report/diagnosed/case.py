@@ -10,7 +10,7 @@ import numpy as np
 
 from surgisim.artifacts.base import load
 from surgisim.artifacts.mismatch import Mismatch
-from surgisim.artifacts.verdict import Verdict, read_verdict
+from surgisim.artifacts.verdict import PULLED, Marker, Verdict, read_verdict
 from surgisim.problem import Problem
 from surgisim.recordings.folder import read_recording
 from surgisim.recordings.recording import Recording
@@ -25,6 +25,19 @@ class Diagnosed:
     """physics.json as it stands."""
     experiment: dict[str, Any] = field(default_factory=dict)
     """"center" and "pull" [m] of the separating experiment, where the diagnosis gives them."""
+
+    @property
+    def shown(self) -> tuple[Marker, ...]:
+        """Places that the words name: effects by number, the largest misfit by its letter."""
+        return self.verdict.markers
+
+    @property
+    def markers(self) -> tuple[Marker, ...]:
+        """The same, and where the separating experiment takes hold."""
+        if not self.experiment:
+            return self.shown
+        x, y, z = (float(c) for c in self.experiment["center"])
+        return (*self.shown, Marker(PULLED, "the pull that would decide", (x, y, z)))
 
     @property
     def time(self) -> np.ndarray:
@@ -69,11 +82,16 @@ def read(recording: Path, diagnosis: Path, mismatch: Path, physics: Path) -> Dia
             f"{diagnosis}: is of recording {verdict.recording} with {len(left.phase)} frames in {mismatch.name}, but "
             f"{recording} is {clip.name} with {clip.frames}. Pass files of one diagnosis."
         )
+    if verdict.goodness and len(verdict.goodness.per_frame) > clip.frames:
+        raise Problem(
+            f"{diagnosis}: its goodness has {len(verdict.goodness.per_frame)} frames, but the recording has "
+            f"{clip.frames}. Diagnose anew."
+        )
     told = json.loads(diagnosis.read_text())
     return Diagnosed(clip, verdict, left, json.loads(physics.read_text()), told.get("experiment") or _pull(verdict))
 
 
-PULL = re.compile(r"near \(([-\d., ]+)\) mm, pull ([\d.]+) mm .*?along \(([-\d., ]+)\)")
+PULL = re.compile(r"(?:near|at \w+) \(([-\d., ]+?)(?:\) mm| mm\)), pull ([\d.]+) mm .*?along \(([-\d., ]+)\)")
 """How a diagnosis words a pull."""
 
 

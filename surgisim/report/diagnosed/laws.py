@@ -19,8 +19,8 @@ class Law:
     time: str
 
 
-def law(effect: Effect) -> Law:
-    """Read from the docstring of the law's file, which every law has."""
+def law(effect: Effect, mark: str = "") -> Law:
+    """With the marker of its place. Read from the docstring of the law's file, which every law has."""
     from surgisim.physics.catalogue import catalogue
 
     known = catalogue().get(effect.term)
@@ -30,7 +30,7 @@ def law(effect: Effect) -> Law:
         else f"{effect.term.replace('_', ' ').capitalize()}, by other laws; physics.json says which."
     )
     title, equation, words, source = told(about)
-    return Law(title, equation, words, source, _rows(effect), _place(effect), _time(effect))
+    return Law(title, equation, words, source, _rows(effect), _place(effect, mark), _time(effect))
 
 
 def told(docstring: str) -> tuple[str, str, str, str]:
@@ -61,12 +61,12 @@ def _rows(effect: Effect) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _place(effect: Effect) -> str:
+def _place(effect: Effect, mark: str) -> str:
     if effect.center is None:
         return "everywhere"
     x, y, z = (f"{1e3 * c:.1f}" for c in effect.center)
     extent = f", radius {1e3 * effect.extent:.1f} mm" if effect.extent else ""
-    return f"about ({x}, {y}, {z}) mm{extent}"
+    return f"{mark} ({x}, {y}, {z} mm){extent}".strip()
 
 
 def _time(effect: Effect) -> str:

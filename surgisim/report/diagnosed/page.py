@@ -1,6 +1,6 @@
 """One diagnosis as one HTML file."""
 
-from surgisim.report.diagnosed import places, times
+from surgisim.report.diagnosed import goodness, places, times
 from surgisim.report.diagnosed.case import Diagnosed
 from surgisim.report.diagnosed.laws import law
 from surgisim.report.headline import Card, shown
@@ -29,9 +29,10 @@ def page(case: Diagnosed, *, progress=lambda *_: None) -> bytes:
         "both": times.symptom_and_cause(case),
         "bars": times.bars(case),
         "candidates": times.candidates(case),
+        "goodness": goodness.per_frame(case),
     }
     content = {"case": case, "pictures": pictures, "cards": cards(case), "badge": BADGE[case.verdict.verdict]}
-    content |= {"laws": [law(e) for e in case.verdict.effects], "title": title(case)}
+    content |= {"laws": [law(e, str(n)) for n, e in enumerate(case.verdict.effects, 1)], "title": title(case)}
     text = template("diagnosis.html.j2").render(**content, shown=shown)
     progress(3, 3, "written")
     return text.encode()

@@ -109,7 +109,7 @@ def candidates(case: Diagnosed, most: int = 10) -> str | None:
             color = RIGHT if candidate.term in named else "#b9c1c9"
             axes.barh(row, candidate.probability, color=color, height=0.6)
             note = f"{100 * candidate.probability:.0f} %" + (
-                f", evidence e^-{behind:.1f} of the best" if behind else ""
+                f", \N{GREEK CAPITAL LETTER DELTA} log evidence \N{MINUS SIGN}{behind:.1f}" if behind else ""
             )
             axes.annotate(
                 note,
