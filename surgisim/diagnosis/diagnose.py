@@ -12,7 +12,7 @@ from surgisim.artifacts.physics import Physics
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, nuisance, verdict
 from surgisim.diagnosis.base import Base, fit_base
-from surgisim.diagnosis.candidates import Parts, blocks, costly
+from surgisim.diagnosis.candidates import Parts, blocks, costly, finer
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.evidence import Finding, by_law, judge
 from surgisim.diagnosis.flexible import Bend, Flexible, flexible
@@ -23,7 +23,6 @@ from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
 from surgisim.diagnosis.nuisance import Group
 from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
-from surgisim.diagnosis.sharpen import finer
 from surgisim.diagnosis.together import Together, needed, together
 from surgisim.estimation.trial import at_once
 from surgisim.recordings.recording import Recording

@@ -6,8 +6,9 @@ N(0, L) beforehand,
     log B = 1/2 b^T (G + L^-1)^-1 b - 1/2 log det(1 + L^1/2 G L^1/2),   G = <S, S>, b = <S, r>
 
 and, where an amplitude must be positive, plus log of the share of its posterior above zero over the prior's half. L
-gives every signature the RMS sizes of SIZES, equally likely. A law's evidence is the mean of B over the places, times
-and forms in which it was tried: a law that may be anywhere and anything pays for it.
+gives every signature the RMS sizes of SIZES, equally likely. A law's evidence is the mean, over the scopes in which it
+was tried (everywhere, in a blob, in a layer), of the mean of B over the places, times and forms of that scope: a law
+that may be anywhere and anything pays for it, and the many places of a blob do not dilute what acts everywhere.
 """
 
 from dataclasses import dataclass
@@ -77,13 +78,21 @@ def weigh(h: Hypothesis, gram: np.ndarray, shadow: np.ndarray, plain: np.ndarray
 
 
 def by_law(findings: list[Finding]) -> dict[str, tuple[float, np.ndarray, list[Finding]]]:
-    """Law -> its evidence (mean over what was tried), the same on nulls, and its findings, best first."""
+    """Law -> its evidence (mean over scopes of means over what was tried), on nulls too, and findings, best first."""
     laws: dict[str, list[Finding]] = {}
     for f in findings:
         laws.setdefault(f.hypothesis.term, []).append(f)
     result = {}
     for term, mine in laws.items():
-        logs = logsumexp([f.log_evidence for f in mine]) - np.log(len(mine))
-        nulls = logsumexp([f.nulls for f in mine], axis=0) - np.log(len(mine))
+        scopes: dict[str, list[Finding]] = {}
+        for f in mine:
+            scopes.setdefault(f.hypothesis.scope, []).append(f)
+        logs = _mean([_mean([f.log_evidence for f in some]) for some in scopes.values()])
+        nulls = _mean([_mean([f.nulls for f in some]) for some in scopes.values()])
         result[term] = float(logs), nulls, sorted(mine, key=lambda f: -f.log_evidence)
     return result
+
+
+def _mean(logs: list) -> np.ndarray:
+    """log of the mean of exp, over the first axis."""
+    return logsumexp(logs, axis=0) - np.log(len(logs))

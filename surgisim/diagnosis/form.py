@@ -1,5 +1,6 @@
 """Where, when and in what courses laws are tried."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,3 +75,9 @@ def spread(course: np.ndarray) -> np.ndarray:
 def moments(clip: Clip, count: int) -> np.ndarray:
     last = (clip.until - 1) / clip.fps
     return np.linspace(0.0, 0.92 * last, count)
+
+
+def angles(direction: np.ndarray) -> tuple[float, float]:
+    """Yaw and pitch [rad] that point along a direction, (3,)."""
+    x, y, z = np.asarray(direction, float) / max(np.linalg.norm(direction), 1e-30)
+    return math.atan2(x, z), math.asin(min(max(y, -1.0), 1.0))

@@ -24,6 +24,8 @@ class Hypothesis:
     end: float | None = None
     about: dict = field(default_factory=dict)
     """The other numbers of the form."""
+    scope: str = "everywhere"
+    """What kind of place it was tried at: "everywhere", in a "blob", in a "layer", at a "grip"."""
 
 
 def ease(s: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from surgisim.artifacts.physics import Physics
+from surgisim.diagnosis import candidates
 from surgisim.diagnosis.laws import law_of, steps
 from surgisim.physics.catalogue import choose
 
@@ -33,9 +34,8 @@ def physics(case, refits) -> Physics:
     values, where, known = dict(base.values), {}, base_numbers(base)
     for r in refits:
         h, law = r.finding.hypothesis, law_of(r.finding.hypothesis, r.amplitude, clip)
-        own = law.values
-        if h.term == "tool_slip":
-            own = {"tool_slip": {"slip": min(float(r.amplitude[0]), 1.0), "onset": float(h.onset)}}
+        modelled = candidates.of(h).modelled
+        own = law.values if modelled is None else modelled(h, r.amplitude)
         if set(own) & set(values):
             # A body has each law once: where the second effect needs the first one's again, the first stays.
             continue

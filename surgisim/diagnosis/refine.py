@@ -13,23 +13,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from surgisim.diagnosis import calibration
+from surgisim.diagnosis import calibration, candidates
 from surgisim.diagnosis.base import SPREAD, START, bounded
 from surgisim.diagnosis.clip import Clip
-from surgisim.diagnosis.form import APART, scale
 from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.knobs import Knob, Start
 from surgisim.diagnosis.laws import IMPOSSIBLE, Law, beside, joined, law_of, respond
 from surgisim.diagnosis.metric import metric
 from surgisim.estimation.trial import at_once
 
-LOGARITHMS = {
-    "tau": 0.7, "yield_strain": 0.4, "onset": 0.4, "k2": 0.6, "rate": 0.15, "most": 0.5, "period": 0.15,
-    "wavelength": 0.4,
-}  # fmt: skip
-"""Numbers of a form that are searched by their logarithm, and how far they may be off."""
-EXTENT, MOMENT, TURN, PHASE, GROWS, SLACK = 0.5, 0.12, 0.25, 0.7, 0.7, 5e-4
-"""How far an extent (logarithm), a moment [s], a direction [rad], a phase [rad], the exponent of a tension [1] and a
-slack [m] may be off."""
 STEP = 0.3
 """Of the forward differences, in prior standard deviations."""
 ROUNDS, FRESH = 8, 2
@@ -39,10 +31,6 @@ DONE, LITTLE, FAR = 0.004, 3.0, 0.15
 differences afresh."""
 DRAWS = 200
 """From the posterior, which intervals are read off."""
-
-
-Start = tuple[Hypothesis, np.ndarray]
-"""A hypothesis and its amplitude, (H,)."""
 
 
 @dataclass(frozen=True)
@@ -68,23 +56,23 @@ def refined(
     where the engine breaks down at the start.
     """
     clip, base, whiten, until = case.clip, case.base, case.whiten, case.clip.until
-    knobs = [_knobs(h, amplitude, clip) for h, amplitude in starts]
+    knobs = [candidates.of(h).knobs(h, amplitude) for h, amplitude in starts]
     own = sum(len(k) for k in knobs)
     name = " and ".join(h.term for h, _ in starts)
     # The base is searched by the engine: its slopes leave the metric.
     space = metric(np.delete(case.space.columns, case.slopes, axis=1))
 
-    def turned(x: np.ndarray) -> tuple[list[Start], np.ndarray]:
+    def all_turned(x: np.ndarray) -> tuple[list[Start], np.ndarray]:
         there, at, found = bounded(base.x + x[own:] * SPREAD, clip), 0, []
         for (h, amplitude), mine in zip(starts, knobs, strict=True):
-            here = _turned(h, amplitude, mine, x[at : at + len(mine)], clip)
+            here = turned(h, amplitude, mine, x[at : at + len(mine)], clip)
             # Only what pushes or resists over the tissue's own stiffness shows.
             found.append(beside(*here, float(np.exp(there[0] - base.x[0]))))
             at += len(mine)
         return found, there
 
     def law_at(x: np.ndarray) -> tuple[Law, np.ndarray]:
-        laws, there = turned(x)
+        laws, there = all_turned(x)
         return joined([law_of(h, amplitude, clip) for h, amplitude in laws]), there
 
     def left(x: np.ndarray, _worker: int = 0) -> np.ndarray | None:
@@ -148,69 +136,13 @@ def refined(
     heat = calibration.TEMPERATURE + calibration.MISFIT * max(nothing - best, 0.0)
     spread = np.linalg.inv((normal - np.eye(len(x))) / heat + np.eye(len(x)))
     rng = np.random.default_rng([case.settings.seed, 3])
-    draws = [turned(near)[0] for near in rng.multivariate_normal(x, spread, DRAWS)]
-    return Refined(turned(x)[0], [list(d) for d in zip(*draws, strict=True)], there, response, nothing - best)
+    draws = [all_turned(near)[0] for near in rng.multivariate_normal(x, spread, DRAWS)]
+    return Refined(all_turned(x)[0], [list(d) for d in zip(*draws, strict=True)], there, response, nothing - best)
 
 
-def _knobs(h: Hypothesis, amplitude: np.ndarray, clip: Clip) -> list[tuple[str, object, float]]:
-    """What may be turned: kind, which, and its prior standard deviation."""
-    size = float(np.linalg.norm(amplitude)) or 1.0
-    if (h.sign and len(amplitude) == 1) or h.term == "respiration":
-        # A base's motion enters linearly: its direction and course stay as the search found them.
-        knobs = [("strength", 0, 1.0)]
-    else:
-        knobs = [("amplitude", k, size) for k in range(len(amplitude))]
-    if h.place is not None and h.term != "tool_slip":
-        if h.place.normal is None:
-            knobs += [("center", e, 0.5 * APART * scale(clip)) for e in range(3)]
-            knobs.append(("extent", None, EXTENT))
-        else:
-            knobs.append(("depth", None, 0.5 * APART * scale(clip)))
-    moving = h.term in ("hidden_contact", "added_mass", "gravity", "tool_slip", "active_contraction")
-    names = ("onset",) if h.term == "tool_slip" else ("onset", "end")
-    knobs += [(name, None, MOMENT) for name in names if moving and getattr(h, name) is not None]
-    # Damage has a rate of one, which its amplitude scales.
-    free = {k: sd for k, sd in LOGARITHMS.items() if (h.term, k) != ("damage", "rate")}
-    knobs += [("logarithm", key, sd) for key, sd in free.items() if h.about.get(key, 0) > 0]
-    if "axis" in h.about:
-        knobs.append(("turn", "axis", TURN))
-    if "phase" in h.about:
-        knobs.append(("plus", "phase", PHASE))
-    if "grows" in h.about:
-        knobs.append(("grows", "grows", GROWS))
-    if "slack" in h.about:
-        knobs.append(("slack", "slack", SLACK))
-    return knobs
-
-
-def _turned(h: Hypothesis, amplitude: np.ndarray, knobs, x: np.ndarray, clip: Clip) -> tuple[Hypothesis, np.ndarray]:
+def turned(h: Hypothesis, amplitude: np.ndarray, knobs: Sequence[Knob], x: np.ndarray, clip: Clip) -> Start:
     """The hypothesis and its amplitude with every knob turned by x standard deviations."""
-    amplitude, about, place = amplitude.astype(float).copy(), dict(h.about), h.place
-    moments = {"onset": h.onset, "end": h.end}
-    for (kind, which, _), by in zip(knobs, x * np.array([k[2] for k in knobs]), strict=True):
-        if kind == "strength":
-            amplitude *= np.exp(by)
-        elif kind == "amplitude":
-            amplitude[which] += by
-        elif kind == "center":
-            place = replace(place, center=tuple(np.asarray(place.center) + by * np.eye(3)[which]))
-        elif kind == "depth":
-            place = replace(place, center=tuple(np.asarray(place.center) + by * clip.normal))
-        elif kind == "extent":
-            place = replace(place, extent=place.extent * float(np.exp(by)))
-        elif kind in moments:
-            moments[kind] = max(moments[kind] + by, 0.0)
-        elif kind == "logarithm":
-            about[which] *= float(np.exp(by))
-            if which == "most":
-                about[which] = min(about[which], 1.0)
-        elif kind == "turn":
-            axis, n = np.asarray(about[which]), clip.normal
-            about[which] = np.cos(by) * axis + np.sin(by) * np.cross(n, axis)
-        elif kind == "plus":
-            about[which] += by
-        elif kind == "grows":
-            about[which] = float(np.clip(about[which] + by, -1.0, 1.0))
-        elif kind == "slack":
-            about[which] = max(about[which] + by, 0.0)
-    return replace(h, place=place, about=about, **moments), amplitude
+    amplitude = amplitude.astype(float)
+    for knob, by in zip(knobs, x, strict=True):
+        h, amplitude = knob.turn(h, amplitude, float(by), clip)
+    return h, amplitude

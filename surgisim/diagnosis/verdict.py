@@ -9,7 +9,7 @@ from scipy.special import expit
 from surgisim.artifacts.diagnosis import ALIKE, Diagnosis
 from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
-from surgisim.diagnosis import calibration, words
+from surgisim.diagnosis import calibration, candidates, words
 from surgisim.diagnosis.clip import PHASES
 from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.errors import errors, residual, rms
@@ -139,7 +139,9 @@ def write(
     heat, when = cause(base, case.whiten, freed, cleared)
     heat = heat / max(heat.max(), 1e-30)
     if effects and refits[0].finding.hypothesis.place is not None and refits[0].finding.hypothesis.place.normal is None:
-        heat = of_places(clip, laws[refits[0].term][2], base.prepared.simulator.rest)
+        scope = refits[0].finding.hypothesis.scope
+        alike = [f for f in laws[refits[0].term][2] if f.hypothesis.scope == scope]
+        heat = of_places(clip, alike, base.prepared.simulator.rest)
     if named and case.settings.experiment and len(refits) > 1:
         pair = [law_of(r.finding.hypothesis, r.amplitude, clip) for r in refits[:2]]
         effects[0]["separating_experiment"] = separating(
@@ -235,7 +237,7 @@ def doubtful(term: str, shares: dict[str, float | None]) -> bool:
     it one, and only where it presses on a surface; what draws tissue outward holds it. And no law is believed that
     leaves a large misfit on other frames as it was, or that a placebo beats there.
     """
-    loose = term == "hidden_contact" and shares["left"] > calibration.PUSH_LEAVES
+    loose = candidates.catalogue()[term].free_course and shares["left"] > calibration.PUSH_LEAVES
     return loose or draws(shares) or beaten(shares) or idle(shares)
 
 
@@ -256,7 +258,7 @@ def beaten(shares: dict[str, float | None]) -> bool:
 
 def pushes(recording, accepted: list) -> list[tuple[float, Hypothesis]]:
     """Unseen pushes among laws, and how far they point out of the tissue."""
-    mine = [r for r in accepted if r.term == "hidden_contact"]
+    mine = [r for r in accepted if candidates.of(r.finding.hypothesis).presses]
     found = [(r.finding.hypothesis, r.amplitude) for r in mine]
     return [(outward(recording, h.place, amplitude), h) for h, amplitude in found]
 
@@ -317,7 +319,7 @@ def missing(clip) -> list[str]:
 def _effect(case, r, chances, named: set[str], number) -> dict:
     h: Hypothesis = r.finding.hypothesis
     # Of a blob the radius at which it is down to a half; a grip's own radius.
-    reach = 1.0 if r.term == "tool_slip" else np.sqrt(2 * np.log(2))
+    reach = 1.0 if candidates.of(h).exact_extent else np.sqrt(2 * np.log(2))
     others = sorted((t for t in chances if t not in named), key=lambda t: -chances[t])
     runners = [{"term": t, "probability": chances[t]} for t in others]
     local = h.place is not None and h.place.normal is None

@@ -3,26 +3,8 @@
 from collections.abc import Sequence
 
 from surgisim.artifacts.verdict import LARGEST
+from surgisim.diagnosis import candidates
 from surgisim.diagnosis.hypothesis import Hypothesis
-
-SAYS = {
-    "hidden_contact": ("something unseen pushes the tissue {where} from {onset} to {end}", "a push there ({amount})"),
-    "added_mass": ("the tissue sags {where} from {onset} on, as under a load", "a weight there ({amount})"),
-    "tether": ("the tissue {where} is held back once it has moved, as by an adhesion", "a band there ({amount})"),
-    "gravity": ("all tissue shifts one way from {onset} on, as on a tilted table", "that change of weight ({amount})"),
-    "respiration": ("the base moves to and fro, touched or not, as with breathing", "a moving base ({amount})"),
-    "tool_slip": ("the tissue follows the instrument less and less from {onset} on", "a grip that slips ({amount})"),
-    "stiff_inclusion": ("the tissue {where} strains {less} than around it", "a lump of another stiffness ({amount})"),
-    "base_layer": ("the deep tissue strains {less} than what lies above it", "a layer of another stiffness ({amount})"),
-    "stiffening": ("the tissue resists the more the further it is strained", "strain stiffening ({amount})"),
-    "fibre": ("the tissue resists being stretched along one direction", "strands in that direction ({amount})"),
-    "pretension": ("the tissue resists bending and lifting as something taut does", "a tension at rest ({amount})"),
-    "relaxation": ("tissue gives way while held and creeps back after the release", "stiffness that fades ({amount})"),
-    "plastic_set": ("the tissue does not come back all the way after the release", "a lasting set ({amount})"),
-    "damage": ("the tissue is softer after it has been strained than before", "damage ({amount})"),
-    "active_contraction": ("the tissue contracts by itself, in waves", "muscle that pulls ({amount})"),
-    "sliding_base": ("the tissue glides along its base where it is pulled hard", "a base with friction ({amount})"),
-}  # fmt: skip
 
 READ_IN = {"1": (1.0, ""), "kg": (1e3, " g")}
 """Units that nobody reads a tissue's numbers in, and what is written instead."""
@@ -42,8 +24,7 @@ def sentence(found: Sequence[tuple[Hypothesis, dict[str, dict], float]], gained:
 
 def _told(h: Hypothesis, parameters: dict[str, dict], number: int) -> tuple[str, str]:
     """What a law makes tissue do, and what it is; number: its marker's."""
-    seen, law = SAYS[h.term]
-    where = "" if h.place is None else _at(number, h.place.center)
+    law = candidates.of(h)
     amount = ""
     if parameters:
         name, first = next(iter(parameters.items()))
@@ -51,10 +32,10 @@ def _told(h: Hypothesis, parameters: dict[str, dict], number: int) -> tuple[str,
         value, low, high = (times * first[key] for key in ("value", "low", "high"))
         amount = f"{name} = {value:.3g}{unit}, {low:.3g} to {high:.3g}"
     softer = "s" in parameters and parameters["s"]["value"] < 1
-    said = seen.format(
-        where=where, onset=_moment(h.onset), end=_moment(h.end), less="more" if softer else "less",
+    said = law.seen.format(
+        where=_where(h, number), onset=_moment(h.onset), end=_moment(h.end), less="more" if softer else "less",
     ).replace("  ", " ")  # fmt: skip
-    return said, law.format(amount=amount)
+    return said, law.added.format(amount=amount)
 
 
 def nothing(above: float, later: tuple[float, float] | None = None) -> str:
@@ -104,9 +85,19 @@ def drawn(h: Hypothesis, number: int = 1) -> str:
     )
 
 
+def _where(h: Hypothesis, mark: int) -> str:
+    if h.place is None:
+        return ""
+    return _at(mark, h.place.center) if h.place.normal is None else f"in the layer beyond {_place(h.place.center)}"
+
+
 def _at(mark: int | str, where: Sequence[float]) -> str:
     """A place by its marker and where it is in the recording's frame; where: [m]."""
-    return f"at {mark} ({', '.join(f'{1e3 * c:.0f}' for c in where)} mm)"
+    return f"at {mark} {_place(where)}"
+
+
+def _place(where: Sequence[float]) -> str:
+    return f"({', '.join(f'{1e3 * c:.0f}' for c in where)} mm)"
 
 
 def _moment(seconds: float | None) -> str:

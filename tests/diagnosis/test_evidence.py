@@ -1,5 +1,7 @@
 """Evidence prefers what is there, and charges for having looked in many places."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -43,3 +45,13 @@ def test_a_law_tried_in_many_places_pays_for_them(parts):
     others = [found(rng.standard_normal(400), residual, "anywhere") for _ in range(50)]
     laws = by_law([found(s, residual), found(s, residual, "anywhere"), *others])
     assert laws["here"][0] - laws["anywhere"][0] == pytest.approx(np.log(51), abs=0.05)
+
+
+def test_the_many_places_of_one_scope_do_not_dilute_another(parts):
+    rng, s = parts
+    residual = (0.6 * s + rng.standard_normal(400))[:, None]
+    there = found(s, residual, "law")
+    alone = by_law([there])["law"][0]
+    blobs = [found(rng.standard_normal(400), residual, "law") for _ in range(50)]
+    blobs = [replace(b, hypothesis=replace(b.hypothesis, scope="blob")) for b in blobs]
+    assert alone - by_law([there, *blobs])["law"][0] == pytest.approx(np.log(2), abs=0.05)

@@ -6,7 +6,8 @@ from planted import GRID, recording
 
 from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import SPHERE, Clash, joined, law_of, stiffness_of
+from surgisim.diagnosis.inclusion import SPHERE, stiffness_of
+from surgisim.diagnosis.laws import Clash, joined, law_of
 from surgisim.physics.catalogue import choose
 from surgisim.physics.place import Place
 from surgisim.physics.terms.active_contraction import spread, twin_wave

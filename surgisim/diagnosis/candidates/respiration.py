@@ -1,0 +1,84 @@
+"""The held base moves to and fro, as with breathing: two harmonics along any direction."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from surgisim.diagnosis import knobs, pushes
+from surgisim.diagnosis.candidate import Candidate, Parts
+from surgisim.diagnosis.form import Block, angles, knots, spread
+from surgisim.diagnosis.hypothesis import Hypothesis, ease
+from surgisim.diagnosis.law import Law
+from surgisim.diagnosis.look import Look
+from surgisim.diagnosis.uncertain import scaled
+
+NAME = "respiration"
+FASTEST, SLOWEST = 0.75, 0.18
+"""Rates that are tried [1/s]."""
+SOME = 0.7
+"""Least share of a period that the fitted frames must hold."""
+SETS_IN = 0.5
+"""How long it takes to set in [s]."""
+
+
+def law(h, amplitude, clip) -> Law:
+    return Law({NAME: _breath(amplitude.reshape(4, 3), h.about["rate"])}, {})
+
+
+def _breath(parts: np.ndarray, rate: float) -> dict[str, float]:
+    """From sine and cosine of two harmonics along three axes, (4, 3), to one direction.
+
+    What has a larger second harmonic than its first breathes twice as fast, without one.
+    """
+    scaled_parts = parts * np.array([1.0, 1.0, 0.5, 0.5])[:, None]
+    left, size, right = np.linalg.svd(scaled_parts, full_matrices=False)
+    s, c, s2, c2 = left[:, 0] * size[0]
+    if math.hypot(s2, c2) > math.hypot(s, c):
+        s, c, s2, c2, rate = s2, c2, 0.0, 0.0, 2 * rate
+    first, second = math.hypot(s, c), math.hypot(s2, c2)
+    yaw, pitch = angles(right[0])
+    return {
+        "amplitude": max(first, 1e-9), "period": 1 / rate, "phase": math.atan2(c, s),
+        "second": second / max(first, 1e-9), "second_phase": math.atan2(c2, s2), "yaw": yaw, "pitch": pitch,
+    }  # fmt: skip
+
+
+def _block(look: Look, rates: np.ndarray) -> Block:
+    columns = look.once("base", None, lambda: pushes.of_load(look, look.base.tangent.anchored(0).T))
+    at, found = knots(look.clip), []
+    for rate in rates:
+        up, turn = ease(at / SETS_IN), 2 * np.pi * rate * at
+        waves = [
+            up * np.sin(turn),
+            up * (np.cos(turn) - 1),
+            0.5 * up * np.sin(2 * turn),
+            0.5 * up * (np.cos(2 * turn) - 1),
+        ]
+        mix = np.concatenate([spread(w) for w in waves], 1)
+        found.append(Hypothesis(NAME, mix, 0, None, about={"rate": rate}))
+    return Block(columns, found)
+
+
+def tried(look: Look) -> Parts:
+    if look.clip.body.held.any():
+        last = knots(look.clip)[-1]
+        yield "breathing", lambda: iter([_block(look, np.geomspace(max(SLOWEST, SOME / last), FASTEST, 14))])
+
+
+def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:
+    # A rate off by two parts in a hundred is out of step by the time of the frames held out.
+    reach = 0.12 if step == 1 else 0.02
+    yield _block(look, h.about["rate"] * np.exp(reach * np.linspace(-1, 1, 13)))
+
+
+CANDIDATE = Candidate(
+    law=law,
+    tried=tried,
+    finer=finer,
+    # A base's motion enters linearly: its direction and course stay as the search found them.
+    knobs=lambda h, a: [*knobs.strength(h, a), knobs.logarithm("rate", 0.15)],
+    interval=scaled("amplitude"),
+    seen="the base moves to and fro, touched or not, as with breathing",
+    added="a moving base ({amount})",
+)
