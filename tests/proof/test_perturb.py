@@ -40,12 +40,12 @@ CHANGES = {
     "plane+3": {"boxes"},
     "plane-3": {"boxes"},
     "noplate_plane+3": {"mesh", "boxes"},
-    **dict.fromkeys(("drift0.3", "drift1", "bilinear1", "jitter0.1", "jitter0.3", "new_noise"), {"points"}),
-    **dict.fromkeys(("focal+10", "focal-10"), {"mesh", "boxes", "points", "center_rest", "position"}),
-    **dict.fromkeys(("missing2", "missing5", "missing20"), {"points", "visible"}),
+    **{key: {"points"} for key in ("drift0.3", "drift1", "bilinear1", "jitter0.1", "jitter0.3", "new_noise")},
+    **{key: {"mesh", "boxes", "points", "center_rest", "position"} for key in ("focal+10", "focal-10")},
+    **{key: {"points", "visible"} for key in ("missing2", "missing5", "missing20")},
     "half_frames": {"fps", "points", "visible", "position", "active", "split"},
     "half_points": {"points", "visible", "sigma"},
-    **dict.fromkeys(("noise2", "noise1.1"), {"points", "sigma"}),
+    **{key: {"points", "sigma"} for key in ("noise2", "noise1.1")},
     "rotated": {"mesh", "boxes", "points", "center_rest", "position", "gravity"},
 }
 
