@@ -19,20 +19,14 @@ FILES = {"perturbed": ".json", "rest": ".ply", "fixed": ".json", "grip": ".npz",
     settings=Perturb,
 )
 def main(recording, truth_tracks, *, settings, progress):
-    import json
-
     import numpy as np
 
     from surgisim.proof.perturb.catalogue import perturbed
-    from surgisim.recordings.folder import encoded_recording, read_recording
+    from surgisim.proof.six_files import six_files
+    from surgisim.recordings.folder import read_recording
 
     true = np.load(truth_tracks)["true"].astype(float) if truth_tracks else None
-    own = read_recording(recording)
-    made = perturbed(settings.name, own, settings.seed, true)
-    # A recording without a split gets the one that a reader would give it, so that all have the same files.
-    files = {"split.json": json.dumps({"fit": [0, made.fitted_until], "held_out": list(made.held_out)}).encode()}
-    files |= encoded_recording(made)
-    return tuple(files[name] for name in ("recording.json", *(f"{n}{s}" for n, s in list(FILES.items())[1:])))
+    return six_files(perturbed(settings.name, read_recording(recording), settings.seed, true))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import numpy as np
 
 from surgisim.artifacts.verdict import read_verdict
 from surgisim.proof.naming import common
-from surgisim.proof.perturb.catalogue import AS_IS
+from surgisim.proof.perturb.names import AS_IS
 from surgisim.proof.shares import share
 
 FORMAT = "surgisim-metamorphic/1"

@@ -7,7 +7,7 @@ from typing import Any
 from surgisim.artifacts.verdict import Verdict, read_verdict
 from surgisim.problem import Problem
 from surgisim.proof.naming import SURE, common
-from surgisim.proof.perturb.catalogue import AS_IS
+from surgisim.proof.perturb.names import AS_IS
 from surgisim.proof.shares import share
 
 FORMAT = "surgisim-robustness/1"
@@ -67,7 +67,7 @@ def figures(rows: list[dict[str, Any]], names: tuple[str, ...]) -> dict[str, Any
 def cell(verdict: Verdict, concealed: str | None) -> Cell:
     """One verdict against the law concealed, None for nothing.
 
-    outcome: silent or alarm where nothing is concealed, right or withdrawn where a law is, wrong where another is named.
+    outcome: silent or alarm where nothing is concealed, right or withdrawn where a law is, wrong where another is said.
     """
     given = [common(term) for term in verdict.names]
     if given:
@@ -99,7 +99,7 @@ def _row(folder: Path, diagnoses: Path, body: int, perturbations: list[str]) -> 
 
 
 def bodies(seed: int, count: int) -> list[int]:
-    """Cases of a seed's mixture, of LAWS alone: a third conceal nothing, the others a law each, by turn."""
+    """Cases of a seed's mixture, of LAWS alone: first a third that conceal nothing, then a law each, by turn."""
     from surgisim.phantom.mixture import concealed
 
     empty, single, case = [], [], 0
@@ -108,4 +108,4 @@ def bodies(seed: int, count: int) -> list[int]:
         if len(names) < 2:
             (single if names else empty).append(case)
         case += 1
-    return sorted(empty[: count // 3] + single[: count - count // 3])
+    return empty[: count // 3] + single[: count - count // 3]

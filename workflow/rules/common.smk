@@ -18,7 +18,18 @@ from surgisim.proof.known.catalogue import catalogue as known_recordings
 from surgisim.proof.shuffle import partner
 
 # What the rules for concealed recordings read of the config, beside the clips' choices.
-BLIND = ("seed", "seeds", "cases", "invent", "diagnosis")
+BLIND = (
+    "seed",
+    "seeds",
+    "cases",
+    "invent",
+    "diagnosis",
+    "bodies",
+    "before",
+    "recordings",
+    "drawn_from",
+    "draws",
+)
 
 try:
     PLAN = plan(

@@ -1,11 +1,6 @@
-"""Every perturbation by name.
-
-PERTURBED is made of the recording; INVENTED of the scene, which is invented once more with other settings; SETTINGS
-leaves the recording as it is and diagnoses it with other settings.
-"""
+"""Every perturbation that is made of a recording, by name."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -16,8 +11,6 @@ from surgisim.recordings.recording import Recording
 
 Perturb = Callable[[Recording, np.random.Generator, np.ndarray | None], Recording]
 """Of a recording, a generator, and the noise-free paths [m], (K, T, 3), where they are known."""
-AS_IS = "as_is"
-"""What perturbed recordings are compared with."""
 
 PERTURBED: Mapping[str, Perturb] = {
     "release+1": lambda r, rng, true: grips.longer(r, 1),
@@ -46,16 +39,6 @@ PERTURBED: Mapping[str, Perturb] = {
     "box0.3": lambda r, rng, true: mount.reaching(mount.bare(r), 0.3e-3),
     "noise1.1": lambda r, rng, true: tracking.noisier(r, rng, None, 1.1),
 }
-INVENTED: Mapping[str, Mapping[str, Any]] = {
-    "fast": {"lag": 3e-4},
-    "release_between": {"close_phase": 0.5, "release_phase": 0.5},
-}
-SETTINGS: Mapping[str, Mapping[str, Any]] = {"finer_grid": {"grid": 0.13}}
-
-KEYLESS = ("release+1", "release-1", "box0.3", "box3", "missing5", "noise1.1", "rotated")
-"""Those that ask no key and no phantom."""
-KEYED = (*(name for name in PERTURBED if name not in ("box0.3", "noise1.1")), *INVENTED)
-"""Those of a phantom's recording."""
 
 
 def perturbed(name: str, recording: Recording, seed: int, true: np.ndarray | None = None) -> Recording:
