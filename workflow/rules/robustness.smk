@@ -20,7 +20,11 @@ ASKED = {}
 for path in map(Path, config.get("recordings", [])):
     ASKED[path.parent.name if path.name == "recording" else path.name] = path
 if not ASKED:
-    ASKED = {name: Path(f"known/{name}/recording") for name in KNOWN}
+    ASKED = {
+        name: Path(f"known/{name}/recording")
+        for name, known in KNOWN.items()
+        if known.convert
+    }
 
 
 wildcard_constraints:
