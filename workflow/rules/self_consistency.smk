@@ -4,19 +4,6 @@
 of the recording in FOLDER, each diagnosed again.
 """
 
-from surgisim.config.draws import OF_NULLS
-
-DRAWS = int(config.get("draws", 100))
-
-
-def drawn_from(w):
-    """What every recording has of the one that is drawn from: a body that conceals nothing, unless one is given."""
-    place = config.get(
-        "drawn_from", f"robustness/{SEED}/{chosen_bodies()[0]}/recording"
-    )
-    needed = ("recording.json", "rest.ply", "fixed.json", "tracks.npz")
-    return [Path(place) / name for name in needed]
-
 
 wildcard_constraints:
     number=r"\d+",
