@@ -30,3 +30,11 @@ class Invent(Settings):
     """Names of effects that may be concealed; all if empty [name]."""
     faint: bool = False
     """Whether effects are concealed too that can hardly be seen at a tissue's magnitudes [1]."""
+    lag: float | None = Field(None, gt=0, le=0.02)
+    """Viscosity over Young's modulus; drawn from 1 to 8 ms if null [s]."""
+    close_phase: float = Field(0.0, ge=0, lt=1)
+    """How long before its first active frame a grip closes, share of a frame [1]."""
+    release_phase: float = Field(0.0, ge=0, lt=1)
+    """How long after its last active frame a grip opens, share of a frame [1]."""
+    plate: bool = True
+    """Whether the recorded body stands on the plate that its base is stuck to [1]."""

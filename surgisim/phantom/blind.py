@@ -17,7 +17,7 @@ from surgisim.phantom.effect import Hidden, catalogue, conceal, described
 from surgisim.phantom.follow import follow
 from surgisim.phantom.mixture import concealed
 from surgisim.phantom.model import model
-from surgisim.phantom.scene import Scene, draw
+from surgisim.phantom.scene import Hold, Scene, draw
 from surgisim.phantom.snr import Found, scaled, signal
 from surgisim.problem import Problem
 
@@ -67,14 +67,19 @@ def invent(settings: Invent, progress: Progress | None = None, names: tuple[str,
     """
     spacings = settings.spacing, settings.spacing_coarse
     drawn = draw(generator(settings, "scene"), fps=settings.fps, points=settings.points, spacings=spacings)
+    if settings.lag is not None:
+        drawn = drawn.lagging(settings.lag)
+    drawn = drawn.between_frames(settings.close_phase, settings.release_phase)
     scene, (plain, quick) = borne(drawn, spacings, progress)
     free = nuisance.visible(scene, plain, generator(settings, "visible"))
     if names is None:
         names = concealed(settings.seed, settings.case, tuple(settings.only), settings.faint)
     true, aims = _with_effects(settings, scene, names, plain, quick, free, progress)
-    seen = nuisance.seen(scene, true, settings.noise, generator(settings, "noise"))
+    rest = scene.shape.upper(scene.probes)
+    seen = nuisance.seen(rest, true, settings.noise, generator(settings, "noise"))
     name = name_of(settings.seed, settings.case)
-    files = folder.recording(scene, name, seen, free, settings.noise, model(scene, settings.spacing))
+    body = model(scene, settings.spacing)
+    files = folder.recording(scene, name, seen, free, settings.noise, body, plate=settings.plate)
     tracks = folder.npz(plain=plain.astype(np.float32), true=true.astype(np.float32))
     truth = _truth(settings, scene, name, aims, plain, true, free, tracks)
     return Invented(name, files, (json.dumps(truth, indent=1, allow_nan=False) + "\n").encode(), tracks)
@@ -214,6 +219,13 @@ def _truth(settings, scene, name, aims, plain, true, free, tracks) -> dict:
         "snr_held_out": ratio(settings, scene, difference, free, held_out=True),
         "noise": settings.noise,
         "base": {"E": law.E, "nu": law.nu, "eta": law.eta, "density": law.density},
-        "phases": [{"begin": h.begin, "arrive": h.arrive, "release": h.release} for h in scene.holds],
+        "phases": [_phases(hold) for hold in scene.holds],
         "tracks_sha256": hashlib.sha256(tracks).hexdigest(),
     }
+
+
+def _phases(hold: Hold) -> dict[str, float]:
+    """The frames of a grip, and by how much it misses them where it closes or opens between frames."""
+    missed = {"close_phase": hold.close_phase, "release_phase": hold.release_phase}
+    frames = {"begin": hold.begin, "arrive": hold.arrive, "release": hold.release}
+    return frames | {name: share for name, share in missed.items() if share}

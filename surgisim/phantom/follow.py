@@ -11,6 +11,7 @@ from scipy.spatial import Delaunay
 from surgisim.phantom.forces import FAST, add_forces
 from surgisim.phantom.march import SAFETY, least_swelling, stable_step
 from surgisim.phantom.model import Model
+from surgisim.phantom.scene import Hold
 from surgisim.problem import Problem
 
 Progress = Callable[[float, float, str], None]
@@ -28,9 +29,6 @@ def follow(model: Model, progress: Progress | None = None, text: str = "moving t
     steps = substeps(model)
     taken: dict[int, np.ndarray] = {}
     for frame in range(1, scene.frames):
-        for j, hold in enumerate(scene.holds):
-            if frame == hold.begin + 1:
-                taken[j] = x - model.mesh.points
         advance(model, x, v, frame, steps, taken)
         if not np.isfinite(x).all() or least_swelling(x, model.mesh.cells) <= 0:
             raise Problem(
@@ -53,16 +51,22 @@ def substeps(model: Model) -> int:
 def advance(model: Model, x: np.ndarray, v: np.ndarray, frame: int, steps: int, taken: dict[int, np.ndarray]) -> None:
     """Move x and v from the frame before to `frame`.
 
-    `taken` holds, for each grip that has closed, the displacement [m], (N, 3), in which it found the tissue.
+    `taken` holds, for each grip that has closed, the displacement [m], (N, 3), in which it found the tissue; one that
+    closes on the way is added.
     """
     scene, parts, rest = model.scene, model.parts, model.mesh.points
     dt = 1 / scene.fps / steps
     force, pull = np.empty_like(x), dt / parts.mass
     law = parts.cells, parts.inverse, parts.weight, parts.mu, parts.lam, parts.eta
-    held = [j for j, h in enumerate(scene.holds) if h.begin < frame <= h.release]
-    nodes = [np.flatnonzero(model.mesh.gripped[j] & ~model.mesh.fixed) for j in held]
-    found = [taken[j][mine] + rest[mine] for j, mine in zip(held, nodes, strict=True)]
+    spans = [_held(hold, frame, steps) for hold in scene.holds]
+    held: dict[int, tuple[np.ndarray, np.ndarray]] = {}
     for s in range(steps):
+        for j, (first, end) in enumerate(spans):
+            if s == first < end:
+                mine = np.flatnonzero(model.mesh.gripped[j] & ~model.mesh.fixed)
+                held[j] = mine, taken.setdefault(j, x - rest)[mine] + rest[mine]
+            elif s == end:
+                held.pop(j, None)
         t = (frame - 1) / scene.fps + s * dt
         force[:] = 0.0
         add_forces(x, v, *law, force)
@@ -72,9 +76,16 @@ def advance(model: Model, x: np.ndarray, v: np.ndarray, frame: int, steps: int, 
             pull = dt / (parts.mass + model.burden[1](t) * model.burden[0])
         _kick(v, force, pull)
         model.support.hold(x, v, t + dt, dt)
-        for j, mine, there in zip(held, nodes, found, strict=True):
+        for j, (mine, there) in held.items():
             v[mine] = (there + model.grasp[j](t + dt, rest[mine]) - x[mine]) / dt
         _drift(x, v, dt)
+
+
+def _held(hold: Hold, frame: int, steps: int) -> tuple[int, int]:
+    """The first step from the frame before to `frame` in which a grip holds, and one past the last."""
+    closes, opens = hold.begin - hold.close_phase, hold.release + hold.release_phase
+    first, end = (min(max(round((at - frame + 1) * steps), 0), steps) for at in (closes, opens))
+    return first, end
 
 
 def _reader(model: Model) -> Callable[[np.ndarray], np.ndarray]:

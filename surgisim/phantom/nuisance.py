@@ -12,14 +12,13 @@ ALIKE = 0.006
 """Distance at which neighbours' errors are still alike [m]."""
 
 
-def seen(scene: Scene, true: np.ndarray, sigma: float, rng: np.random.Generator) -> np.ndarray:
-    """Observed positions [m] for true ones, (K, T, 3).
+def seen(rest: np.ndarray, true: np.ndarray, sigma: float, rng: np.random.Generator) -> np.ndarray:
+    """Observed positions [m] for true ones, (K, T, 3), of points that sit at `rest` [m], (K, 3).
 
     Noise of standard deviation `sigma` [m] an axis, of which a part lasts (AR(1)) and is shared by neighbours;
     a constant offset of each point; a rigid jitter of the camera.
     """
     points, frames = true.shape[:2]
-    rest = scene.shape.upper(scene.probes)
     away = np.linalg.norm(rest[:, None] - rest[None], axis=-1)
     kernel = np.exp(-0.5 * (away / (ALIKE * rng.uniform(0.6, 1.4))) ** 2) + 1e-6 * np.eye(points)
     mix = np.linalg.cholesky(kernel)

@@ -20,7 +20,7 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Hold:
-    """One grip: where, how far, and when; it closes and opens on frames."""
+    """One grip: where, how far, and when; it closes and opens on frames, or shares of a frame beside them."""
 
     grip: Grip
     pull: np.ndarray
@@ -31,6 +31,10 @@ class Hold:
     """Frame at which the pull has arrived."""
     release: int
     """Frame after which the tissue is free."""
+    close_phase: float = 0.0
+    """Share of a frame by which it closes before `begin`, still at rest [1]."""
+    release_phase: float = 0.0
+    """Share of a frame by which it opens after `release` [1]."""
 
     def path(self, frames: np.ndarray) -> np.ndarray:
         """Displacement at times in frames [m], (S, 3)."""
@@ -66,6 +70,15 @@ class Scene:
         """The same with pulls of this share of their length."""
         first, second = (replace(hold, pull=share * hold.pull) for hold in self.holds)
         return replace(self, holds=(first, second))
+
+    def between_frames(self, close_phase: float, release_phase: float) -> "Scene":
+        """The same with grips that close and open these shares of a frame [1] outside their active frames."""
+        first, second = (replace(h, close_phase=close_phase, release_phase=release_phase) for h in self.holds)
+        return replace(self, holds=(first, second))
+
+    def lagging(self, lag: float) -> "Scene":
+        """The same tissue with a viscosity of `lag` [s] times its Young's modulus."""
+        return replace(self, law=replace(self.law, eta=lag * self.law.E))
 
 
 def draw(rng: np.random.Generator, *, fps: float, points: int, spacings: tuple[float, ...]) -> Scene:
