@@ -35,7 +35,7 @@ def chosen_bodies():
 def of_every_body(pattern):
     """Input function: a file of every body of the run, of every perturbation if it names one."""
     return lambda w: expand(
-        pattern, seed=w.seed, body=chosen_bodies(), perturbation=OF_BODIES
+        pattern, seed=SEED, body=chosen_bodies(), perturbation=OF_BODIES
     )
 
 
@@ -84,10 +84,8 @@ def diagnosing(w):
 
 
 def earlier(room):
-    """Params function: where another version left its diagnoses, as a flag."""
-    return lambda w: (
-        f"--before {config['before']}/{room.format(**w)}" if "before" in config else ""
-    )
+    """Where another version left its diagnoses, as a flag."""
+    return f"--before {config['before']}/{room}" if "before" in config else ""
 
 
 def drawn_from(w):

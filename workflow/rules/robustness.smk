@@ -118,42 +118,43 @@ rule perturbed_diagnosis:
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
-rule robustness_score:
+rule robustness:
     input:
         truth=of_every_body("robustness/{seed}/{body}/sealed/truth.json"),
         diagnosis=of_every_body(
             "robustness/{seed}/{body}/{perturbation}/diagnosis.json"
         ),
     output:
-        table="robustness/{seed}/robustness.json",
+        table=f"robustness/{SEED}/robustness.json",
         page=report(
-            "robustness/{seed}/robustness.html",
+            f"robustness/{SEED}/robustness.html",
             caption="../report/robustness.rst",
             category="concealed recordings",
-            labels={"seed": "{seed}", "way": "perturbed"},
+            labels={"seed": str(SEED), "way": "perturbed"},
         ),
-        picture="robustness/{seed}/robustness.png",
+        picture=f"robustness/{SEED}/robustness.png",
     log:
-        "logs/robustness/{seed}/robustness.log",
+        f"logs/robustness/{SEED}/robustness.log",
     benchmark:
-        "benchmarks/robustness/{seed}/robustness.tsv"
+        f"benchmarks/robustness/{SEED}/robustness.tsv"
     conda:
         "../../envs/report.yaml"
     resources:
         mem_mb=1000,
     params:
-        before=earlier("robustness/{seed}"),
+        folder=f"robustness/{SEED}",
+        before=earlier(f"robustness/{SEED}"),
         settings=lambda w: json.dumps(
             {"bodies": chosen_bodies(), "perturbations": OF_BODIES}
         ),
         code=code("robustness"),
     shell:
-        'python "$SURGISIM/stages/robustness.py" --folder robustness/{wildcards.seed} {params.before}'
+        'python "$SURGISIM/stages/robustness.py" --folder {params.folder} {params.before}'
         " --table {output.table} --page {output.page} --picture {output.picture}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
-rule metamorphic_score:
+rule metamorphic:
     input:
         diagnosis=expand(
             "metamorphic/{name}/{perturbation}/diagnosis.json",
@@ -184,13 +185,3 @@ rule metamorphic_score:
         'python "$SURGISIM/stages/metamorphic.py" --folder metamorphic {params.before}'
         " --table {output.table} --page {output.page}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
-
-
-rule robustness:
-    input:
-        f"robustness/{SEED}/robustness.html",
-
-
-rule metamorphic:
-    input:
-        "metamorphic/metamorphic.html",

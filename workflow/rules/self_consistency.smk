@@ -97,7 +97,7 @@ rule drawn_diagnosis:
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
-rule self_consistency_score:
+rule self_consistency:
     input:
         diagnoses=expand(
             "self_consistency/{number}/diagnosis.json", number=range(DRAWS)
@@ -118,8 +118,3 @@ rule self_consistency_score:
     shell:
         'python "$SURGISIM/stages/self_consistency.py" --diagnoses {input.diagnoses}'
         " --table {output.table} --picture {output.picture} --code {params.code} > {log} 2>&1"
-
-
-rule self_consistency:
-    input:
-        "self_consistency/self_consistency.png",
