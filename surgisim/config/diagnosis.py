@@ -6,7 +6,6 @@ from pydantic import Field
 
 from surgisim.config.base import Settings
 
-
 Kinds = Literal[
     "release", "held", "lag", "scale", "drift", "simulator", "grip radius", "grip centre", "grip firmness", "grip path",
     "elastic law",

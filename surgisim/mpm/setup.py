@@ -78,7 +78,9 @@ class Prepared:
         firm: bool = True,
         late: np.ndarray | None = None,
     ) -> Drive:
-        """The boundary condition of `motion`; `late` as in `grip.drive`; the anchors' spring follows the tissue's modulus in `values` at `places`.
+        """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values` at `places`.
+
+        late: as in `grip.drive`.
 
         firm: whether the base is known to hold, as in a recording that says so. Where it is guessed, as in a video,
         one that gives way a little is the better guess: held hard at the wrong place, a release fits a modulus many

@@ -119,6 +119,15 @@ def line(row: dict[str, Any], done: int, whole: int) -> str:
     return f"{done}/{whole} {row['state']:<11} {row['seconds']:6.0f} s  {row['out']}  {said}"
 
 
+def _setting(said: str) -> tuple[str, Any]:
+    """A key and its value, of KEY=VALUE."""
+    key, _, value = said.partition("=")
+    try:
+        return key, json.loads(value)
+    except json.JSONDecodeError:
+        return key, value
+
+
 @contextmanager
 def _process(job: Job, gpu: str | None, log: Any) -> Iterator[subprocess.Popen]:
     """A diagnosis of its own; whatever happens, nothing of it goes on."""
@@ -147,9 +156,12 @@ def main(arguments: Iterable[str] | None = None) -> int:
     told = cli.parse_args(arguments)
     try:
         if told.one:
+            from surgisim.config.base import parse
+            from surgisim.config.diagnosis import Diagnosing
             from surgisim.diagnosis.files import carry_out
 
-            print(carry_out(Path(told.one[0]), Path(told.one[1]), tuple(told.one[2:])))
+            settings = parse(Diagnosing, dict(map(_setting, told.one[2:])), "diagnose")
+            print(carry_out(Path(told.one[0]), Path(told.one[1]), settings))
             return 0
         if told.list is None:
             cli.error("--list is wanted")

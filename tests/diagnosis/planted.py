@@ -14,7 +14,9 @@ from surgisim.recordings.recording import Recording
 SIZE, FPS, FRAMES, FIT = np.array([0.036, 0.030, 0.012]), 10.0, 32, 24
 GRID = 0.23
 TRUE = np.array([np.log(2.5e3), 0.44, np.log(4e-3)])
-NOISE = dict(shared=0.3, length=0.006, rigid=0.02, tilt=0.02, keep_shared=0.6, keep_rigid=0.5, lasting=0.2, keep=0.6, white=0.45)
+NOISE = dict(
+    shared=0.3, length=0.006, rigid=0.02, tilt=0.02, keep_shared=0.6, keep_rigid=0.5, lasting=0.2, keep=0.6, white=0.45
+)
 
 
 def block() -> Mesh:

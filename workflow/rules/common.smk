@@ -19,7 +19,17 @@ from surgisim.proof.known.catalogue import catalogue as known_recordings
 from surgisim.proof.shuffle import partner
 
 # What the rules for concealed recordings read of the config, beside the clips' choices.
-BLIND = ("seed", "seeds", "cases", "invent", "bodies", "before", "recordings", "drawn_from", "draws")
+BLIND = (
+    "seed",
+    "seeds",
+    "cases",
+    "invent",
+    "bodies",
+    "before",
+    "recordings",
+    "drawn_from",
+    "draws",
+)
 
 try:
     PLAN = plan(
