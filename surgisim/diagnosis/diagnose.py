@@ -1,8 +1,7 @@
 """The whole diagnosis of one recording: base, noise, search, refits, verdict (docs/diagnosis.md)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,17 +9,18 @@ from surgisim.artifacts.diagnosis import Diagnosis
 from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis import calibration, nuisance, verdict
-from surgisim.diagnosis.base import Base, fit_base
+from surgisim.diagnosis import calibration, judgement, nuisance, verdict
+from surgisim.diagnosis.base import fit_base
 from surgisim.diagnosis.candidates import Parts, blocks, costly, finer
 from surgisim.diagnosis.clip import Clip, clip_of
-from surgisim.diagnosis.evidence import Finding, by_law, judge
-from surgisim.diagnosis.flexible import Bend, Flexible, flexible
+from surgisim.diagnosis.context import Case, workers
+from surgisim.diagnosis.evidence import Finding, Score, Scores, by_law, highest, judge
+from surgisim.diagnosis.flexible import Bend
 from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
 from surgisim.diagnosis.locate import worst
 from surgisim.diagnosis.memo import Memo
-from surgisim.diagnosis.metric import Metric, metric
-from surgisim.diagnosis.noise import Noise, Whitener, estimate, whitener
+from surgisim.diagnosis.metric import metric
+from surgisim.diagnosis.noise import Whitener, estimate, whitener
 from surgisim.diagnosis.nuisance import Group
 from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
 from surgisim.diagnosis.together import Together, needed, together
@@ -28,54 +28,8 @@ from surgisim.estimation.trial import at_once
 from surgisim.recordings.recording import Recording
 
 Progress = Callable[[float, float, str], None]
-ON_A_GPU = 8
-"""Runs side by side there: their steps take hardly longer than one's."""
 FIRSTS = 2
 """Laws beside which a second one is looked for."""
-
-
-@dataclass(frozen=True)
-class Case:
-    """What all steps share."""
-
-    clip: Clip
-    settings: Diagnosing
-    noise: Noise
-    whiten: Whitener
-    base: Base
-    space: Metric
-    memo: Memo
-    z: np.ndarray
-    """Whitened residual of the base, (N,)."""
-    nulls: np.ndarray
-    """(N, D)"""
-    slopes: slice
-    """Where the base's own columns stand in the metric, after those of the groups."""
-    groups: list[Group]
-    """What a residual may hold beside physics, over the whole clip."""
-    drift: float
-    """How far the camera drifts over the clip, as its rest shows [m]."""
-
-    @cached_property
-    def flexible(self) -> Flexible:
-        """What any smooth residual could gain."""
-        return flexible(self.clip, self.whiten, self.space, self.nulls)
-
-    @cached_property
-    def strain(self) -> float:
-        """Squares of the nuisances at their most likely values, over what all but 5 % of the nulls stay below [1]."""
-        own, nulls = (self.space.likely(v) for v in (self.z, self.nulls))
-        return float((own**2).sum() / np.quantile((nulls**2).sum(0), 0.95))
-
-    @property
-    def strained(self) -> bool:
-        """Whether camera, grips, base and the simulator's own error would have to be larger than they ever are."""
-        return self.settings.calibrated and self.strain > calibration.STRAINED
-
-    @property
-    def workers(self) -> int:
-        """Runs side by side."""
-        return workers(self.clip, self.settings)
 
 
 def diagnose(
@@ -93,12 +47,12 @@ def diagnose(
     clip, settings, memo = case.clip, case.settings, case.memo
     laws = by_law(findings)
     bend = case.flexible.fit(case.z)
-    detected = case.strained or max(entry[0] for entry in laws.values()) > threshold(laws, settings)
+    detected = case.strained or max(score.evidence for score in laws.values()) > threshold(laws, settings)
     if detected:
         parts = costly(clip, case.base, memo, case.workers)
         findings += search(case, case.z, case.nulls, lambda s, text: progress(0.64, 1, text), parts)
         laws = by_law(findings)
-    ranked, refits = sorted(laws, key=lambda term: -laws[term][0]), []
+    ranked, refits = sorted(laws, key=lambda term: -laws[term].evidence), []
     if detected:
         case, refits = compete(case, laws, ranked, progress)
     fitted = None
@@ -107,18 +61,18 @@ def diagnose(
     return verdict.write(case, laws, ranked, refits, fitted, bend, lambda text: progress(0.97, 1, text))
 
 
-def compete(case: Case, laws: dict, ranked: list[str], progress: Progress) -> tuple[Case, list[Refit]]:
+def compete(case: Case, laws: Scores, ranked: list[str], progress: Progress) -> tuple[Case, list[Refit]]:
     """The best laws as the engine runs them, best first, and the case with what was learned of its grips."""
     settings, refits = case.settings, []
-    best = laws[ranked[0]][2][0].gain
-    waiting = [t for t in ranked if laws[t][2][0].gain > calibration.RIVAL * best][: settings.refine]
+    best = laws[ranked[0]].best.gain
+    waiting = [t for t in ranked if laws[t].best.gain > calibration.RIVAL * best][: settings.refine]
     while waiting:
         progress(0.65 + 0.02 * len(refits), 1, f"the engine with {', '.join(waiting)}")
         fine = [sharpened(case, laws[term], case.z) for term in waiting]
         refits += at_once(lambda one, _: refit(case, *one, case.z), fine, case.workers)
         known = {r.term for r in refits}
         top = max(r.log_evidence for r in refits)
-        rest = [t for t in ranked if t not in known and laws[t][0] > top]
+        rest = [t for t in ranked if t not in known and laws[t].evidence > top]
         # What the engine does not confirm gives way to what the tangent puts next.
         waiting = rest[:1] if len(refits) < 2 * settings.refine else []
     refits.sort(key=lambda r: -r.log_evidence)
@@ -135,11 +89,6 @@ def compete(case: Case, laws: dict, ranked: list[str], progress: Progress) -> tu
     return case, sorted(refits, key=lambda r: -r.log_evidence)
 
 
-def workers(clip: Clip, settings: Diagnosing) -> int:
-    """Runs side by side."""
-    return settings.workers if clip.device == "cpu" else ON_A_GPU
-
-
 def first_look(
     recording: Recording, settings: Diagnosing, memo: Memo, progress: Progress
 ) -> tuple[Case, list[Finding]]:
@@ -150,13 +99,13 @@ def first_look(
     return case, search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.39 * s, 1, text))
 
 
-def hazy(case: Case, laws: dict) -> bool:
+def hazy(case: Case, laws: Scores) -> bool:
     """Whether something is hidden for certain and no law says clearly what.
 
     What is hidden close to a grip, where tissue tears, is steeper than a coarse grid can show: there nothing fits well,
     and how firmly the grip carries makes up for it.
     """
-    return case.strained and max(entry[0] for entry in laws.values()) < calibration.CLEAR
+    return case.strained and max(score.evidence for score in laws.values()) < calibration.CLEAR
 
 
 def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress) -> Case:
@@ -224,12 +173,11 @@ def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts 
     return found
 
 
-def threshold(laws: dict, settings: Diagnosing) -> float:
+def threshold(laws: Scores, settings: Diagnosing) -> float:
     """log evidence that the best law must exceed."""
-    highest = np.max([nulls for _, nulls, _ in laws.values()], 0)
     if not settings.calibrated:
         return 0.0
-    return max(calibration.THRESHOLD, float(np.quantile(highest, 0.95)))
+    return max(calibration.THRESHOLD, float(np.quantile(highest(laws), 0.95)))
 
 
 def from_rest(case: Case, best: Refit, z: np.ndarray) -> bool:
@@ -248,16 +196,15 @@ def from_rest(case: Case, best: Refit, z: np.ndarray) -> bool:
     return found - rest > calibration.THRESHOLD
 
 
-def sharpened(case: Case, law: tuple, z: np.ndarray) -> tuple[Finding, float]:
+def sharpened(case: Case, law: Score, z: np.ndarray) -> tuple[Finding, float]:
     """A law's best finding on two finer lattices, and the law's evidence with what that gains."""
-    evidence, _, findings = law
-    best = findings[0]
+    best = law.best
     residual, seen = case.space.cleared(z[:, None]), case.clip.seen[:, : case.clip.until]
     for step in (1.0, 0.5):
         for block in finer(case.clip, case.base, best.hypothesis, step):
             found = judge(block, case.whiten, case.space, residual, -1, seen)
             best = max([best, *(f for f in found if f.hypothesis.term == best.hypothesis.term)], key=lambda f: f.gain)
-    return best, evidence + 0.5 * (best.gain - findings[0].gain)
+    return best, law.evidence + 0.5 * (best.gain - law.best.gain)
 
 
 def explained_by(case: Case, refits: list[Refit], bend: Bend, progress: Progress) -> tuple[list, Together]:
@@ -282,7 +229,7 @@ def explained_by(case: Case, refits: list[Refit], bend: Bend, progress: Progress
     order = sorted(pairs.values(), key=promise, reverse=True)
     tried = [fit(pair) for pair in order if promise(pair) > calibration.RUNNER_UP * promise(order[0])]
     both = max(tried, key=lambda t: t.gain, default=None)
-    if both is None or not verdict.pays(case, bend, one, both):
+    if both is None or not judgement.pays(case, bend, one, both):
         return refits, replace(one, beside=both)
     said = needed(case, both)
     # Beside its second, the first is as evident as the two are together.
@@ -298,7 +245,7 @@ def promise(pair: list[Refit]) -> float:
 def another(case: Case, first: Refit, bend: Bend) -> Refit | None:
     """The second effect that pays most once the first is there; None where none may do."""
     until = case.clip.until
-    if verdict.still(case, bend, case.base.simulated + first.response) <= calibration.LITTLE_LEFT:
+    if judgement.still(case, bend, case.base.simulated + first.response) <= calibration.LITTLE_LEFT:
         return None
     white = case.whiten(first.response[:, :until])
     # The first law's strength is open again: its signature joins the nuisances.
@@ -307,7 +254,7 @@ def another(case: Case, first: Refit, bend: Bend) -> Refit | None:
     z = case.z - white
     found = search(left, z, case.nulls, lambda *_: None)
     laws = by_law([f for f in found if f.hypothesis.term != first.term])
-    best = max(laws, key=lambda term: laws[term][0])
-    if laws[best][0] < threshold(laws, case.settings):
+    best = max(laws, key=lambda term: laws[term].evidence)
+    if laws[best].evidence < threshold(laws, case.settings):
         return None
     return refit(left, *sharpened(left, laws[best], z), z)

@@ -77,8 +77,28 @@ def weigh(h: Hypothesis, gram: np.ndarray, shadow: np.ndarray, plain: np.ndarray
     return Finding(h, float(logs[0]), a, best[2], gain, logs[1:], source, float(np.sqrt(max(a @ size @ a, 0))))
 
 
-def by_law(findings: list[Finding]) -> dict[str, tuple[float, np.ndarray, list[Finding]]]:
-    """Law -> its evidence (mean over scopes of means over what was tried), on nulls too, and findings, best first."""
+@dataclass(frozen=True)
+class Score:
+    """What the search says of one law."""
+
+    evidence: float
+    """log evidence: mean over scopes of means over what was tried."""
+    nulls: np.ndarray
+    """The same on residuals of nothing, (D,)."""
+    findings: list[Finding]
+    """Best first."""
+
+    @property
+    def best(self) -> Finding:
+        return self.findings[0]
+
+
+Scores = dict[str, Score]
+"""Law -> its score."""
+
+
+def by_law(findings: list[Finding]) -> Scores:
+    """Of everything that was tried."""
     laws: dict[str, list[Finding]] = {}
     for f in findings:
         laws.setdefault(f.hypothesis.term, []).append(f)
@@ -89,8 +109,13 @@ def by_law(findings: list[Finding]) -> dict[str, tuple[float, np.ndarray, list[F
             scopes.setdefault(f.hypothesis.scope, []).append(f)
         logs = _mean([_mean([f.log_evidence for f in some]) for some in scopes.values()])
         nulls = _mean([_mean([f.nulls for f in some]) for some in scopes.values()])
-        result[term] = float(logs), nulls, sorted(mine, key=lambda f: -f.log_evidence)
+        result[term] = Score(float(logs), nulls, sorted(mine, key=lambda f: -f.log_evidence))
     return result
+
+
+def highest(laws: Scores) -> np.ndarray:
+    """log evidence of the best law on each residual of nothing, (D,)."""
+    return np.max([score.nulls for score in laws.values()], 0)
 
 
 def _mean(logs: list) -> np.ndarray:

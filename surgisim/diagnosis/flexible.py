@@ -26,6 +26,8 @@ class Bend:
     """Of chi square, less what it gains on nulls on average."""
     fitted: np.ndarray
     """[m], (K, T_fit, 3)."""
+    slack: float = 0.0
+    """What all but 5 % of the nulls gain, beyond that average."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +42,17 @@ class Flexible:
     """(3 M, 3 M)"""
     by_chance: float
     """Of chi square, gained on nulls on average."""
+    slack: float
+    """What all but 5 % of the nulls gain, beyond that."""
 
     def fit(self, z: np.ndarray) -> Bend:
         """To a whitened residual (N,)."""
         shadow = (self.cleared.T @ z.astype(np.float32)).astype(float)[:, None]
         x, gains = _fitted(self.gram, shadow)
         parts = x.reshape(3, len(self.field))
-        return Bend(float(gains[0]) - self.by_chance, np.einsum("em,mkt->kte", parts, self.field, optimize=True))
+        return Bend(
+            float(gains[0]) - self.by_chance, np.einsum("em,mkt->kte", parts, self.field, optimize=True), self.slack
+        )
 
 
 def flexible(clip: Clip, whiten: Whitener, space: Metric, nulls: np.ndarray) -> Flexible:
@@ -55,7 +61,8 @@ def flexible(clip: Clip, whiten: Whitener, space: Metric, nulls: np.ndarray) -> 
     white = whiten(np.concatenate([field[..., None] * e for e in np.eye(3)])).T.astype(np.float32)
     gram, cleared = space.gram(white, white), space.cleared(white)
     _, gains = _fitted(gram, (cleared.T @ nulls.astype(np.float32)).astype(float))
-    return Flexible(field, cleared, gram, float(gains.mean()))
+    by_chance = float(gains.mean())
+    return Flexible(field, cleared, gram, by_chance, float(np.quantile(gains, 0.95)) - by_chance)
 
 
 def _fitted(gram: np.ndarray, shadow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -41,14 +41,14 @@ def wrong(named: Together, refits: list[Refit], laws: dict) -> list[Finding]:
     """The best law at other places where it has one, otherwise laws of as few numbers that nobody would name."""
     best = refits[0].finding.hypothesis
     if best.place is not None:
-        places = [f for f in laws[best.term][2] if f.hypothesis.scope == best.scope]
+        places = [f for f in laws[best.term].findings if f.hypothesis.scope == best.scope]
         away = [np.linalg.norm(np.subtract(f.hypothesis.place.center, best.place.center)) for f in places]
         far = [f for f, distance in zip(places, away, strict=True) if distance > AWAY]
         if far:
             return far
     like = {r.term for r in [*named.refits, *refits[:LIKE]]}
     return [
-        laws[term][2][0] for term in sorted(laws) if term not in like and laws[term][2][0].hypothesis.mix.shape[1] <= 3
+        laws[term].best for term in sorted(laws) if term not in like and laws[term].best.hypothesis.mix.shape[1] <= 3
     ]
 
 

@@ -18,7 +18,7 @@ def sentence(found: Sequence[tuple[Hypothesis, dict[str, dict], float]], gained:
     removes = "removes" if len(told) == 1 else "together remove"
     return (
         f"Beside its simulation the recording shows that {seen}. "
-        f"Adding {added} {removes} {100 * gained:.0f} % of the misfit that physics can explain."
+        f"Adding {added} {removes} {100 * gained:.0f} % of the misfit that can be told from noise."
     )
 
 
@@ -50,30 +50,31 @@ def nothing(above: float, later: tuple[float, float] | None = None) -> str:
     )
 
 
-def unexplained(best: str, left: float, when: str, where: list[float]) -> str:
+WHY = {
+    "little": "it leaves {left:.0f} % of what any smooth motion could explain: what is missing is not in the "
+    "catalogue, or more than one thing",
+    "loose": "a push follows whatever comes and goes, and this one leaves {left:.0f} % of what any smooth motion "
+    "could explain: what is missing is another thing",
+    "refuted": "the frames held out are farther off with it than without",
+    "beaten": "the same law at a wrong place, or a wrong law, foretells the frames held out better",
+    "unconfirmed": "this recording cannot confirm it (probability {chance:.2f}): another pull, held and released "
+    "where it shows, would",
+}
+"""Why what comes nearest is not named."""
+
+
+def unbelieved(reason: str, best: str, chance: float, left: float, when: str, where: list[float]) -> str:
+    """For a law that comes nearest and is not named; left: share that a smooth field could still explain."""
+    comes = "is supported" if reason == "unconfirmed" else "comes nearest"
     return (
-        f"The recording departs from its simulation, most of all {_at(LARGEST, where)} {when}, "
-        f"and no law tried explains it: {best} comes nearest and leaves {100 * left:.0f} % of it. "
-        "What is missing is not in the catalogue, or more than one thing."
+        f"The recording departs from its simulation, most of all {_at(LARGEST, where)} {when}, and {best} {comes}. "
+        f"It is not named, because {WHY[reason].format(left=100 * left, chance=chance)}."
     )
 
 
-def beaten(best: str, by: float, when: str, where: list[float]) -> str:
-    """by: what a placebo's held-out error is above that of the best law [um], less than nothing."""
-    return _unbelieved(best, when, where, f"a placebo foretells the manipulation held out better, by {-by:.2g} um RMS")
-
-
-def idle(best: str, when: str, where: list[float]) -> str:
-    """For a law that fits and foretells nothing."""
-    why = "it leaves the manipulation held out nearly as far off as it was"
-    return _unbelieved(best, when, where, f"{why}: what is missing is another thing, or more than one")
-
-
-def _unbelieved(best: str, when: str, where: list[float], why: str) -> str:
-    return (
-        f"The recording departs from its simulation, most of all {_at(LARGEST, where)} {when}, "
-        f"and {best} comes nearest. It is not named, because {why}."
-    )
+def beside(told: Sequence[str]) -> str:
+    """Sentences that follow a verdict's own."""
+    return "".join(f" {sentence}" for sentence in told)
 
 
 def drawn(h: Hypothesis, number: int = 1) -> str:

@@ -1,0 +1,74 @@
+"""What all steps of a diagnosis share."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis import calibration
+from surgisim.diagnosis.base import Base
+from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.flexible import Flexible, flexible
+from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.metric import Metric
+from surgisim.diagnosis.noise import Noise, Whitener
+from surgisim.diagnosis.nuisance import Group
+from surgisim.diagnosis.prospect import Prospect, prospect
+
+ON_A_GPU = 8
+"""Runs side by side there: their steps take hardly longer than one's."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One recording with its noise, its base and everything that is no physics."""
+
+    clip: Clip
+    settings: Diagnosing
+    noise: Noise
+    whiten: Whitener
+    base: Base
+    space: Metric
+    memo: Memo
+    z: np.ndarray
+    """Whitened residual of the base, (N,)."""
+    nulls: np.ndarray
+    """(N, D)"""
+    slopes: slice
+    """Where the base's own columns stand in the metric, after those of the groups."""
+    groups: list[Group]
+    """What a residual may hold beside physics, over the whole clip."""
+    drift: float
+    """How far the camera drifts over the clip, as its rest shows [m]."""
+
+    @cached_property
+    def flexible(self) -> Flexible:
+        """What any smooth residual could gain."""
+        return flexible(self.clip, self.whiten, self.space, self.nulls)
+
+    @cached_property
+    def strain(self) -> float:
+        """Squares of the nuisances at their most likely values, over what all but 5 % of the nulls stay below [1]."""
+        own, nulls = (self.space.likely(v) for v in (self.z, self.nulls))
+        return float((own**2).sum() / np.quantile((nulls**2).sum(0), 0.95))
+
+    @cached_property
+    def prospect(self) -> Prospect | None:
+        """What frames held out say of a prediction; None where there are none."""
+        return prospect(self)
+
+    @property
+    def strained(self) -> bool:
+        """Whether camera, grips, base and the simulator's own error would have to be larger than they ever are."""
+        return self.settings.calibrated and self.strain > calibration.STRAINED
+
+    @property
+    def workers(self) -> int:
+        """Runs side by side."""
+        return workers(self.clip, self.settings)
+
+
+def workers(clip: Clip, settings: Diagnosing) -> int:
+    """Runs side by side."""
+    return settings.workers if clip.device == "cpu" else ON_A_GPU

@@ -1,0 +1,268 @@
+"""What is said of a recording: which explanation stands, how probable it is, and why it is or is not named.
+
+Every explanation (a law, or two fitted together) has the evidence of the frames that were fitted and, where frames were
+held out, what it gains there over the base (prospect.py). Their sum orders them. What the frames held out refute gives
+way to the next, which they must confirm. What they cannot show, because the effect does nothing there, is named only
+where the fitted frames leave no doubt.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import expit
+
+from surgisim.diagnosis import calibration, candidates
+from surgisim.diagnosis.contact import outward
+from surgisim.diagnosis.context import Case
+from surgisim.diagnosis.errors import residual, rms
+from surgisim.diagnosis.evidence import Scores
+from surgisim.diagnosis.flexible import Bend
+from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.noise import Noise, estimate
+from surgisim.diagnosis.prospect import Gain
+from surgisim.diagnosis.refit import Refit
+from surgisim.diagnosis.together import Together, least, prediction
+
+REASONS = ("named", "faint", "loose", "drawn", "little", "unconfirmed", "refuted", "beaten", "unclear")
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Laws that may be named."""
+
+    fitted: Together
+    log_evidence: float
+    """Of the frames that were fitted."""
+    ahead: Gain | None
+    """What it gains over the base in the frames held out; None where there are none."""
+    left: float
+    """Share of what a smooth field could explain that is left beside it."""
+    outward: float | None
+    """How far a push among its laws points out of the tissue (contact.py); None without one."""
+
+    @property
+    def first(self) -> Refit:
+        return self.fitted.refits[0]
+
+    @property
+    def support(self) -> float:
+        """log evidence of all frames: those held out count as a prediction of numbers that were fitted elsewhere."""
+        return self.log_evidence + (0.0 if self.ahead is None else 0.5 * self.ahead.value)
+
+    @property
+    def loose(self) -> bool:
+        """Whether a push, which follows whatever comes and goes, leaves more than one that is there would."""
+        law = candidates.of(self.first.finding.hypothesis)
+        return law.free_course and self.left > calibration.PUSH_LEAVES
+
+    @property
+    def drawn(self) -> bool:
+        """Whether a push draws tissue out of its surface, as no contact can."""
+        return self.outward is not None and self.outward > calibration.PULLS
+
+    @property
+    def refuted(self) -> bool:
+        return self.ahead is not None and self.ahead.refuted
+
+    @property
+    def confirmed(self) -> bool:
+        return self.ahead is not None and self.ahead.confirmed
+
+    @property
+    def visible(self) -> bool:
+        return self.ahead is not None and self.ahead.visible
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is said of a recording, before it is written down."""
+
+    verdict: str
+    reason: str
+    """One of REASONS."""
+    chosen: Explanation | None
+    chances: dict[str, float]
+    """Law -> probability."""
+    explained: float
+    """Share of the misfit that can be told from noise, which what is named takes away."""
+    after: np.ndarray
+    """Displacement of the points with what is named [m], (K, T, 3)."""
+    noise: Noise
+    taken: float | None = None
+    """Share of the fitted frames' mean square beyond the noise that it takes away."""
+    over_placebo: Gain | None = None
+
+    @property
+    def named(self) -> bool:
+        return self.verdict in ("named", "equivalence class")
+
+    @property
+    def accepted(self) -> list[Refit]:
+        """Laws that say something, best first."""
+        return [] if self.chosen is None else self.chosen.fitted.refits
+
+
+def explanations(case: Case, refits: list[Refit], fitted: Together, bend: Bend) -> list[Explanation]:
+    """What may be named, most supported first. fitted: the best law, or two that pay together; refits: all."""
+    singles = [r for r in refits if r.response.any() and r is not fitted.refits[0]]
+    tried = [fitted, *(prediction(case, [r], case.base.simulated + r.response, r.x) for r in singles)]
+    if len(fitted.refits) == 1:
+        tried = [t for t in tried if t is fitted or t.refits[0].term != fitted.refits[0].term]
+    return sorted((_explanation(case, t, bend) for t in tried), key=lambda e: -e.support)
+
+
+def _explanation(case: Case, fitted: Together, bend: Bend) -> Explanation:
+    ahead = None if case.prospect is None else case.prospect.gain(case.base.simulated, fitted.moved)
+    out = max((out for out, _ in pushes(case.clip.recording, fitted.refits)), default=None)
+    return Explanation(fitted, fitted.refits[0].log_evidence, ahead, still(case, bend, fitted.moved), out)
+
+
+def judged(case: Case, laws: Scores, tried: list[Explanation], bend: Bend, over: Gain | None = None) -> Judgement:
+    """Where something is detected. over: what is named gains over a placebo in the frames held out."""
+    chosen = stands(tried)
+    chances = probabilities(laws, tried)
+    fitted, term = chosen.fitted, chosen.first.term
+    total = max(explainable(bend), fitted.gain, 1e-9)
+    explained = float(np.clip(fitted.gain / total, 0, 1))
+    noise = noise_beside(case, fitted.moved)
+    took = taken(case, fitted.moved, noise.sigma)
+    reason = _reason(case, chosen, explained, took, over)
+    if reason == "faint":
+        return nothing(case, laws, took)
+    verdict = "named" if reason == "named" else "unexplained"
+    rivals = [e for e in tried if e is not chosen and e.first.term != term and chances[e.first.term] > 0.1]
+    alike = [e for e in rivals if cos(case, chosen.first, e.first) > calibration.ALIKE]
+    if verdict == "named" and alike and chances[term] < calibration.SURE:
+        verdict = "equivalence class"
+    if verdict == "unexplained":
+        # What explains little, or is not believed, is no more probable than that, and all other laws with it.
+        most = float(np.clip(min(explained, 1 - chosen.left, took) / 2, 0.0, 0.45))
+        if reason == "unconfirmed":
+            most = 0.45
+        scale = min(1.0, most / max(max(chances.values()), 1e-12))
+        chances = {t: scale * chance for t, chance in chances.items()}
+    # A law that is named beside another is as probable as that, not as it would be in the other's stead.
+    chances |= {r.term: min(alone(r), chances[term]) for r in fitted.refits[1:]}
+    after = fitted.moved if verdict != "unexplained" else case.base.simulated
+    return Judgement(verdict, reason, chosen, chances, explained, after, noise, took, over)
+
+
+def stands(tried: list[Explanation]) -> Explanation:
+    """The first of them that is not refuted; one that is not the best must be confirmed."""
+    for n, each in enumerate(tried):
+        sound = not (each.refuted or each.loose or each.drawn) and each.log_evidence > calibration.THRESHOLD
+        if sound and (n == 0 or each.confirmed):
+            return each
+    return tried[0]
+
+
+def _reason(case: Case, chosen: Explanation, explained: float, took: float, over: Gain | None) -> str:
+    evidence = chosen.log_evidence
+    if case.settings.calibrated and not case.strained and evidence < calibration.CLEAR and took < calibration.TAKEN:
+        return "faint"
+    if chosen.loose:
+        return "loose"
+    if chosen.drawn:
+        return "drawn"
+    if chosen.refuted:
+        return "refuted"
+    if evidence < calibration.THRESHOLD or explained < calibration.EXPLAINED:
+        return "little"
+    if chosen.visible and not chosen.confirmed:
+        return "unconfirmed"
+    if not chosen.visible and evidence < calibration.CLEAR:
+        return "unconfirmed"
+    if over is not None and over.refuted:
+        return "beaten"
+    return "named"
+
+
+def nothing(case: Case, laws: Scores, took: float | None = None) -> Judgement:
+    """Where no law says what noise and nuisances do not; took: what the best law takes, where it was run."""
+    plain = case.base.simulated
+    top = max(score.evidence for score in laws.values())
+    logs = {term: score.evidence / calibration.TEMPERATURE for term, score in laws.items()}
+    chances = _shares(logs, max(0.0, calibration.THRESHOLD - top) / 4)
+    if took is not None:
+        scale = min(1.0, took / 2 / max(chances.values()))
+        chances = {term: scale * chance for term, chance in chances.items()}
+    return Judgement("nothing detectable", "faint", None, chances, 0.0, plain, noise_beside(case, plain), took)
+
+
+def probabilities(laws: Scores, tried: list[Explanation]) -> dict[str, float]:
+    """Law -> probability; what is missing to 1 is nothing, or a law that nobody thought of."""
+    best = max(e.fitted.gain for e in tried)
+    heat = calibration.TEMPERATURE + calibration.MISFIT * max(best, 0.0)
+    logs = {term: score.evidence for term, score in laws.items()}
+    run: dict[str, float] = {}
+    for e in tried:
+        run[e.first.term] = max(e.support, run.get(e.first.term, -np.inf))
+    logs = {term: value / heat for term, value in (logs | run).items()}
+    return _shares(logs, calibration.THRESHOLD / heat)
+
+
+def _shares(logs: dict[str, float], none: float) -> dict[str, float]:
+    scale = max(*logs.values(), none)
+    weight = {term: np.exp(value - scale) for term, value in logs.items()}
+    whole = sum(weight.values()) + np.exp(none - scale)
+    return {term: float(w / whole) for term, w in weight.items()}
+
+
+def alone(r: Refit) -> float:
+    """Probability of a law for itself, beside what else is named."""
+    heat = calibration.TEMPERATURE + calibration.MISFIT * max(r.gain, 0.0)
+    return float(expit((r.log_evidence - calibration.THRESHOLD) / heat))
+
+
+def pushes(recording, accepted: list[Refit]) -> list[tuple[float, Hypothesis]]:
+    """Unseen pushes among laws, and how far they point out of the tissue."""
+    mine = [r for r in accepted if candidates.of(r.finding.hypothesis).presses]
+    found = [(r.finding.hypothesis, r.amplitude) for r in mine]
+    return [(outward(recording, h.place, amplitude), h) for h, amplitude in found]
+
+
+def pays(case: Case, bend: Bend, one: Together, both: Together) -> bool:
+    """Whether a second law fitted together with the first says enough to be named beside it."""
+    rest, left = (still(case, bend, t.moved) for t in (one, both))
+    return left < (1 - calibration.SECOND) * rest and 0.5 * (both.gain - one.gain) > least(one)
+
+
+def still(case: Case, bend: Bend, after: np.ndarray) -> float:
+    """Share of what a smooth field could explain that is left beside a prediction."""
+    clip = case.clip
+    z = case.z - case.whiten(after[:, : clip.until] - case.base.simulated[:, : clip.until])
+    return float(np.clip(explainable(case.flexible.fit(z)) / max(explainable(bend), 1e-9), 0, 1))
+
+
+def explainable(bend: Bend) -> float:
+    """chi square that a smooth field gains beyond what it gains on nearly all residuals of nothing."""
+    return max(bend.gain - bend.slack, 0.0)
+
+
+def cos(case: Case, a: Refit, b: Refit) -> float:
+    """Likeness of two laws' whitened responses, beside everything that is no physics."""
+    until = case.clip.until
+    white = np.stack([case.whiten(r.response[:, :until]) for r in (a, b)], 1)
+    G = case.space.gram(white, white)
+    return float(abs(G[0, 1]) / np.sqrt(max(G[0, 0] * G[1, 1], 1e-30)))
+
+
+def noise_beside(case: Case, after: np.ndarray) -> Noise:
+    """The noise with an effect taken off: then quiet frames show it alone."""
+    clip, quiet = case.clip, slice(0, case.clip.until)
+    return estimate(
+        residual(case, after, False)[:, quiet], clip.seen[:, quiet], clip.rest, clip.quiet()[quiet],
+        clip.recording.sigma[clip.kept],
+    )  # fmt: skip
+
+
+def taken(case: Case, after: np.ndarray, sigma: float) -> float:
+    """Share of the misfit's mean square beyond the noise that a prediction takes away on fitted frames."""
+    floor = 3e6 * sigma**2
+    before, left = (rms(case, s)[0] ** 2 - floor for s in (case.base.simulated, after))
+    return float(np.clip(1 - left / before, 0, 1)) if before > 0 else 0.0
+
+
+def reordered(refits: list[Refit], chosen: Explanation) -> list[Refit]:
+    """Laws with the chosen one first."""
+    return [chosen.first, *(r for r in refits if r.term != chosen.first.term)]

@@ -1,0 +1,81 @@
+"""What a recording leaves open, as it came out: camera, timing, grips; and how well every frame is met."""
+
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_solve
+
+from surgisim.diagnosis.context import Case
+
+TOLD = 0.7
+"""Share of its prior spread below which a nuisance is told by the recording."""
+LARGE = 3.0
+"""Times the tracking noise's RMS beyond which a camera's drift is worth a sentence."""
+
+
+def nuisances(case: Case) -> list[dict[str, Any]]:
+    """Every nuisance that a reader would ask for: its most likely value beside the base, and how surely."""
+    likely = case.space.likely(case.z)
+    spread = np.sqrt(np.diag(cho_solve(case.space.factor, np.eye(case.space.columns.shape[1]))))
+    result, at = [], 0
+    for group in case.groups:
+        for n, (name, sd, unit) in enumerate(group.values):
+            share = float(spread[at + n])
+            result.append(
+                {"name": name, "value": float(likely[at + n] * sd), "sd": share * sd, "unit": unit,
+                 "said": share < TOLD}
+            )  # fmt: skip
+        at += len(group.columns)
+    drift = drifted(case)
+    if drift is not None:
+        result.append({"name": "camera drift by the end", "value": drift, "sd": case.drift, "unit": "m", "said": True})
+    for j, last in case.clip.releases():
+        late = float(case.clip.opening[j, last])
+        result.append(
+            {"name": f"opening of grip {j} after its last active frame", "value": late, "sd": 0.2, "unit": "frames",
+             "said": True}
+        )  # fmt: skip
+    held = {"name": "what is held ends beyond its box by", "value": case.clip.raised, "unit": "m", "said": True}
+    return [*result, held | {"sd": 5e-4}]
+
+
+def drifted(case: Case) -> float | None:
+    """How far the camera has drifted by the last fitted frame, RMS over the points [m]; None where it is left out."""
+    at = 0
+    for group in case.groups:
+        if group.name == "drift":
+            likely = case.space.likely(case.z)[at : at + len(group.columns)]
+            end = np.einsum("c,cki->ki", likely, group.columns[:, :, case.clip.until - 1])
+            return float(np.sqrt((end**2).sum(1).mean()))
+        at += len(group.columns)
+    return None
+
+
+def told(case: Case) -> list[str]:
+    """Sentences on what is no tissue's physics and large all the same."""
+    said, drift = [], drifted(case)
+    if drift is not None and drift > LARGE * case.noise.sigma:
+        said.append(f"Not tissue: the camera drifts by {1e3 * drift:.2g} mm.")
+    for j, last in case.clip.releases():
+        late = float(case.clip.opening[j, last])
+        if not -0.3 < late < 1.3:
+            way = "later" if late > 0 else "earlier"
+            said.append(f"Grip {j} opens {abs(late):.1f} frames {way} than its last active frame says.")
+    for name in case.base.bound:
+        said.append(f"{name} came to the end of what is tried: the recording does not tell it.")
+    return said
+
+
+def goodness(case: Case, after: np.ndarray) -> dict[str, Any]:
+    """Chi square per degree of freedom of every fitted frame, nuisances at their most likely values.
+
+    after: displacement of the points with what is named [m], (K, T, 3).
+    """
+    clip = case.clip
+    z = case.whiten(clip.moved[:, : clip.until] - after[:, : clip.until])
+    left = (z - case.space.explained(z)).reshape(len(clip.kept), clip.until, 3)
+    seen = 3.0 * clip.seen[:, : clip.until].sum(0)
+    # Constants and nuisances take their share of every frame alike.
+    degrees = np.maximum(seen * case.whiten.free / max(seen.sum(), 1), 1)
+    per_frame = (left**2).sum((0, 2)) / degrees
+    return {"per_frame": [float(g) for g in per_frame], "degrees": [float(d) for d in degrees]}
