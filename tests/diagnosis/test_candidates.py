@@ -151,7 +151,7 @@ def test_a_knob_that_is_not_turned_changes_nothing_and_one_that_is_does(case, tr
         same, as_strong = turned(h, amplitude, knobs, np.zeros(len(knobs)), case.clip)
         plain = law_of(h, amplitude, case.clip)
         assert numbers_of(law_of(same, as_strong, case.clip)) == pytest.approx(numbers_of(plain), rel=1e-12)
-        if scope == "blob":
+        if scope in ("blob", "patch"):
             assert len(knobs) >= 5, "a blob's centre and extent are free"
         for e in np.eye(len(knobs)):
             other = law_of(*turned(h, amplitude, knobs, 0.3 * e, case.clip), case.clip)
