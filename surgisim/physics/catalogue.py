@@ -36,6 +36,12 @@ class Param:
     """Whether a fit searches its logarithm (moduli, viscosities) or itself (ratios, angles)."""
     total: bool = False
     """Whether the number is a sum over the law's place (a force, a mass), to be shared out per cubic metre."""
+    outside: Literal["fades", "stays", "grows"] = "fades"
+    """What becomes of it outside the place of a local law.
+
+    It fades to its off value, stays what it is, or grows without bound, as a cap does that is never reached there. A
+    total that does not fade is shared out over all tissue that the law acts on.
+    """
 
 
 @dataclass(frozen=True, kw_only=True)

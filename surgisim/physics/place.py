@@ -8,6 +8,9 @@ import numpy as np
 from surgisim.physics.catalogue import Numbers, Term
 from surgisim.problem import Problem
 
+FARTHEST = 1e-6
+"""Share of a place below which all is as far away."""
+
 
 class Misplaced(Problem):
     """A law acts where no tissue is."""
@@ -46,9 +49,9 @@ def rows(
 ) -> np.ndarray:
     """Columns of all laws at every particle, (P, M).
 
-    A column whose parameter has an off value fades to it outside the law's place; a total is shared out over the
-    place, per cubic metre. masks: 'held' and 'surface', (P,) bool, for laws that act there only.
-    Raises Problem where a law that needs a place has none, Misplaced where the place misses the body.
+    A column whose parameter has an off value fades to it outside the law's place, unless it stays or grows there; a
+    total is shared out over the place, per cubic metre. masks: 'held' and 'surface', (P,) bool, for laws that act there
+    only. Raises Problem where a law that needs a place has none, Misplaced where the place misses the body.
     """
     result = []
     for name, term in terms.items():
@@ -59,10 +62,10 @@ def rows(
             )
         if place is not None and term.place == "everywhere":
             raise Problem(f"law '{name}' acts on the whole body, but a place is given for it. Leave the place away.")
-        weight = np.ones(len(rest)) if place is None else place.weight(rest)
-        if term.on != "body":
-            weight = weight * (masks or {}).get(term.on, 0)
-        shared = float((weight * volume).sum())
+        there = np.ones(len(rest)) if place is None else place.weight(rest)
+        mine = np.ones(len(rest)) if term.on == "body" else 1.0 * (masks or {}).get(term.on, np.zeros(len(rest)))
+        weight = there * mine
+        shared, whole = (float((w * volume).sum()) for w in (weight, mine))
         if shared < 1e-6 * float(volume.sum()):
             raise Misplaced(f"law '{name}' finds no tissue to act on: {_where(place, term)}.")
         row = term.row(values[name])
@@ -70,7 +73,10 @@ def rows(
             row |= term.spread(rest, **values[name])
         for column, value in row.items():
             param = term.params.get(column)
-            if param is not None and param.total:
+            if param is not None and param.outside != "fades":
+                each = value * mine / (whole if param.total else 1.0)
+                result.append(each if param.outside == "stays" else each / np.maximum(there, FARTHEST))
+            elif param is not None and param.total:
                 result.append(value * weight / shared)
             elif param is not None and param.off is not None:
                 result.append(param.off + (value - param.off) * weight)

@@ -5,8 +5,14 @@ import pytest
 from planted import BLOB, GRID, block, recording
 
 from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis.candidates import blocks
+from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.contact import outward
-from surgisim.diagnosis.diagnose import diagnose
+from surgisim.diagnosis.diagnose import diagnose, prepare_case, search, sharpened
+from surgisim.diagnosis.evidence import by_law
+from surgisim.diagnosis.form import angles
+from surgisim.diagnosis.law import NEVER
+from surgisim.diagnosis.laws import law_of
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.verdict import doubtful
 from surgisim.physics.place import Place
@@ -58,6 +64,25 @@ def test_what_draws_tissue_outward_is_not_called_a_contact():
     assert drawn.effects[0]["probability"] < 0.5
     assert "hidden_contact" not in physics.terms
     assert "draws the tissue out of its surface near" in drawn.words
+
+
+def test_a_push_that_stays_comes_out_with_the_sign_it_has():
+    # Constants projected out, it is nearly the opposite push up to its onset.
+    force = np.array([0.02, 0.03, -0.1])
+    yaw, pitch = angles(force)
+    push = {"force": float(np.linalg.norm(force)), "yaw": yaw, "pitch": pitch, "onset": 1.13, "end": NEVER}
+    clip = clip_of(recording({"hidden_contact": push}, {"hidden_contact": BLOB}), share=GRID)
+    case = prepare_case(clip, Diagnosing(grid=GRID, nulls=4), Memo(None, ""), lambda *_: None)
+    tried = blocks(clip, case.base, case.memo, np.array(BLOB.center))
+    law = by_law(search(case, case.z, case.nulls, lambda *_: None, [p for p in tried if p[0].startswith("pushes")]))
+    assert all(f.hypothesis.mix.reshape(3, -1, 3)[0, 0, 0] == 0 for f in law["hidden_contact"][2])
+    best = law["hidden_contact"][2][0]
+    assert best.hypothesis.end is None
+    assert best.hypothesis.onset == pytest.approx(1.07, abs=0.15)
+    assert best.amplitude @ force > 0.9 * np.linalg.norm(best.amplitude) * np.linalg.norm(force)
+    found, _ = sharpened(case, law["hidden_contact"], case.z)
+    assert law_of(found.hypothesis, found.amplitude, clip).values["hidden_contact"]["end"] == NEVER
+    assert outward(clip.recording, found.hypothesis.place, found.amplitude) < -0.5
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ w the share of the bond that is given up [1], n the base's normal by yaw and pit
 [N/m^4, N/m^3] the base's tangential stiffness [N/m] and the largest friction it bears [N], both of the
 whole base, shared out over what it holds. s is how far tissue has slid: elastic predictor and return to
 Coulomb's cap, with the normal load taken as constant. Friction is counted against the base at rest,
-also where another law moves the base.
+also where another law moves the base. At a place, a patch, c is least in its middle and grows without bound around
+it: there the springs k take over the bond that was given up, and never slide.
 Simo and Laursen, An augmented Lagrangian treatment of contact problems involving friction, Computers and
 Structures 42 (1992), section 3.
 """
@@ -81,12 +82,11 @@ TERM = Term(
     twin_advance=twin_advance,
     columns=columns,
     spring=lambda share, stiffness, **_: share * stiffness,
-    place="everywhere",
     on="held",
     params={
-        "share": Param("1", low=0.0, high=1.0, default=0.9, off=0.0, logarithmic=False),
-        "stiffness": Param("N/m", low=10.0, high=1e5, default=1e3, total=True),
-        "cap": Param("N", low=1e-3, high=10.0, default=0.1, total=True),
+        "share": Param("1", low=0.0, high=1.0, default=0.9, off=0.0, logarithmic=False, outside="stays"),
+        "stiffness": Param("N/m", low=10.0, high=1e5, default=1e3, total=True, outside="stays"),
+        "cap": Param("N", low=1e-3, high=10.0, default=0.1, total=True, outside="grows"),
         "yaw": Param("rad", *YAW, default=0.0, logarithmic=False),
         "pitch": Param("rad", *PITCH, default=0.0, logarithmic=False),
     },
