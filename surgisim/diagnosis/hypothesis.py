@@ -25,7 +25,7 @@ class Hypothesis:
     about: dict = field(default_factory=dict)
     """The other numbers of the form."""
     scope: str = "everywhere"
-    """What kind of place it was tried at: "everywhere", in a "blob", in a "layer", at a "grip"."""
+    """What kind of place it was tried at: "everywhere", in a "blob", a "layer", a "patch" of the base, at a "grip"."""
 
 
 def ease(s: np.ndarray) -> np.ndarray:
