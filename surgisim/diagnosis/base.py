@@ -41,10 +41,13 @@ EARLIEST, LATEST = -1.4, 2.4
 SLOWER = 8
 """Times that viscosity may shorten the stable step of tissue of the usual stiffness (`mpm/stable.py`). To a base
 without memory, tissue that relaxes looks viscous without bound, and its runs would take minutes each."""
-STIFFNESSES, LAGS = (-1.2, -0.4, 0.4, 1.2), tuple(np.log(np.array([1e-4, 5e-4, 2e-3, 8e-3, 2.5e-2])) - START[2])
-"""Where a descent may start, in logarithms of E and of eta / E away from START: a ring-down misfits by whole periods,
-and one that is faster than the frames looks like a slower one."""
-DESCENTS_FROM = 3
+STIFFNESSES = tuple(np.log(np.array([1e3, 2.2e3, 5e3, 1.2e4, 3e4])) - START[0])
+LAGS = tuple(np.log(np.array([2e-4, 2e-3, 1.2e-2])) - START[2])
+MOMENTS = (0.0, 0.5, 1.0)
+"""Where a descent may start, in logarithms of E and of eta / E away from START, and moments of release [frames]: a
+ring-down misfits by whole periods, one that is faster than the frames looks like a slower one, and a soft body let go
+early looks like a stiff one let go late."""
+DESCENTS_FROM = 4
 """Of those, from how many a descent starts."""
 STIFFER = np.log(3.0)
 """Step of log E where the body to begin with is torn apart."""
@@ -59,6 +62,9 @@ ALIKE = 2.0
 the softest takes the longest steps."""
 ROUNDS, AGAIN = 3, 25.0
 """Fits at most, and what chi square a run may cost beyond what the last one promised; chosen: 3 where it went well."""
+NEWTONS, SETTLED = 2, 0.1
+"""Steps at most by which grips, held tissue and elastic law, once they are known, move the base, and what counts as
+none, in prior standard deviations."""
 AFTER = 0.5
 """How long a short run goes on after the release [s]."""
 
@@ -105,23 +111,23 @@ def longest_lag(log_E: float, clip: Clip) -> float:
 
 
 def fit_base(
-    clip: Clip, whiten: Whitener, nuisances: Callable[[Clip, np.ndarray, np.ndarray], np.ndarray], memo: Memo, *,
+    clip: Clip, whiten: Whitener, nuisances: Callable[[Clip, np.ndarray, np.ndarray, bool], np.ndarray], memo: Memo, *,
     rounds: int = ROUNDS, workers: int = 1, timing: bool = True, say: Callable[[str], None] = lambda text: None,
 ) -> tuple[Clip, Base]:  # fmt: skip
-    """E, nu and eta, where what is held ends, and when grips open; the clip with the last two, and the base.
+    """E, nu and eta, and when grips open; the clip with the latter, and the base.
 
-    nuisances: of a clip, a base's numbers (3,) and its tracks [m], (K, T, 3), whatever else a residual may hold,
-    whitened at one standard deviation, (N, M). Begun anew, at most `rounds` times, where a run fits worse than the
-    tangent and the short runs before it promised. timing: whether the moments of releases are free.
+    nuisances: of a clip, a base's numbers (3,), its tracks [m], (K, T, 3), and whether these are a first guess,
+    whatever else a residual may hold, whitened at one standard deviation, (N, M). Begun anew, at most `rounds` times,
+    where a run fits worse than the tangent and the short runs before it promised. timing: whether the moments of
+    releases are free.
     """
     releases = clip.releases() if timing else []
-    y, promised = np.concatenate([START, [0.0], np.full(len(releases), OPENS)]), np.inf
-    space = None
+    y, promised = np.concatenate([START, np.full(len(releases), OPENS)]), np.inf
+    bodies = [clip.prepared(TERMS) for _ in range(workers)]
+    prepared = bodies[0]
+    carry = prepared.simulator.carry(clip.rest)
     for n in range(rounds + 1):
         clip = set_to(clip, y, releases)
-        bodies = [clip.prepared(TERMS) for _ in range(workers)]
-        prepared = bodies[0]
-        carry = prepared.simulator.carry(clip.rest)
         say(f"base, run {n + 1}: {told(y, releases)}")
         if n == 0:
             y[:3], (drive, run) = _standing(prepared, clip, y[:3], memo, clip.frames)
@@ -129,11 +135,11 @@ def fit_base(
             drive, run = simulate(prepared, clip, y[:3], memo, clip.frames)
         simulated = carried(carry, run)
         near = tangent(prepared, values_of(y[:3]), drive, run, clip.rest, clip.until)
-        if space is None or n == 1:
-            space = metric(nuisances(clip, y[:3], simulated))
+        if n < 2:
+            space = metric(nuisances(clip, y[:3], simulated, n == 0))
         around = _Around(
             clip, whiten, space, memo, bodies, carry, y.copy(), run, simulated[:, : clip.until],
-            _by_poisson(prepared, near, y[:3]), by_held(clip, y[:3], simulated, memo)[:, : clip.until], releases,
+            _by_poisson(prepared, near, y[:3]), releases,
         )  # fmt: skip
         if n > 0 and (n == rounds or around.cost(y, around.left(y)) < promised + AGAIN):
             break
@@ -149,25 +155,57 @@ def fit_base(
     return clip, Base(x, prepared, drive, run, simulated, near, slopes[:3] * SPREAD[:, None, None, None], spread, bound)
 
 
+def settled(clip: Clip, whiten: Whitener, space: Metric, slopes: slice, base: Base, memo: Memo) -> Base:
+    """The base where everything that is open beside it puts it, and how surely, once all of that is known.
+
+    space: with the base's own slopes in columns `slopes`, each at a prior standard deviation.
+    """
+    until, found = clip.until, base
+
+    def misfit(at: Base) -> tuple[float, np.ndarray]:
+        z = whiten(clip.moved[:, :until] - at.simulated[:, :until])
+        return float(space.gram(z[:, None], z[:, None])[0, 0]), space.likely(z)[slopes]
+
+    least, likely = misfit(base)
+    for _ in range(NEWTONS):
+        x = bounded(found.x + np.clip(likely, -1, 1) * SPREAD, clip)
+        if np.abs((x - found.x) / SPREAD).max() < SETTLED:
+            break
+        try:
+            drive, run = simulate(base.prepared, clip, x, memo, clip.frames)
+        except Breakdown:
+            break
+        moved = replace(
+            found, x=x, drive=drive, run=run, simulated=carried(base.prepared.simulator.carry(clip.rest), run)
+        )
+        cost, likely = misfit(moved)
+        if cost > least - 1.0:
+            break
+        found, least = moved, cost
+    if found is not base:
+        near = tangent(base.prepared, values_of(found.x), found.drive, found.run, clip.rest, until)
+        found = replace(found, tangent=near)
+    open_to = np.linalg.inv(np.eye(space.columns.shape[1]) + (space.columns.T @ space.columns).astype(float))
+    worse = max(1.0, least / max(whiten.free, 1))
+    return replace(found, spread=np.sqrt(worse * np.diag(open_to)[slopes]) * SPREAD)
+
+
 def set_to(clip: Clip, y: np.ndarray, releases: list[tuple[int, int]]) -> Clip:
-    """The clip held and let go as y says, (4 + R,)."""
+    """The clip with grips that open as y says, (3 + R,)."""
     late = clip.opening.copy()
-    for (j, t), after in zip(releases, y[4:], strict=True):
+    for (j, t), after in zip(releases, y[3:], strict=True):
         late[j, t] = after
     # Later releases, of which nothing is fitted, are taken to fall as those that are.
     if len(releases):
         shown = np.zeros(late.shape, bool)
         shown[tuple(np.array(releases).T)] = True
-        late[~shown] = y[4:].mean()
-    clip = replace(clip, late=late)
-    return clip if abs(y[3] - clip.raised) < 1e-6 else clip.laid(raised=float(y[3]))
+        late[~shown] = y[3:].mean()
+    return replace(clip, late=late)
 
 
 def told(y: np.ndarray, releases: list) -> str:
-    opens = f", opens {' and '.join(f'{late:.2f}' for late in y[4:])} frames late" if releases else ""
-    return (
-        f"E {np.exp(y[0]):.0f} Pa, nu {y[1]:.3f}, eta {np.exp(y[0] + y[2]):.2f} Pa s, held {1e3 * y[3]:+.1f} mm{opens}"
-    )
+    opens = f", opens {' and '.join(f'{late:.2f}' for late in y[3:])} frames late" if releases else ""
+    return f"E {np.exp(y[0]):.0f} Pa, nu {y[1]:.3f}, eta {np.exp(y[0] + y[2]):.2f} Pa s{opens}"
 
 
 def by_held(clip: Clip, x: np.ndarray, simulated: np.ndarray, memo: Memo) -> np.ndarray:
@@ -197,8 +235,8 @@ def tracks_of(clip: Clip, x: np.ndarray, memo: Memo, terms: tuple[str, str] = TE
 
 @dataclass(frozen=True)
 class _Around:
-    """Tracks near a run at `x`: nu and what is held move them along their slopes; E, eta and moments of release by
-    short runs from the run's own states."""
+    """Tracks near a run at `x`: nu moves them along its slope; E, eta and moments of release by short runs from the
+    run's own states."""
 
     clip: Clip
     whiten: Whitener
@@ -208,32 +246,29 @@ class _Around:
     """One for each short run at a time."""
     carry: object
     x: np.ndarray
-    """(4 + R,)"""
+    """(3 + R,)"""
     run: Run
     simulated: np.ndarray
     by_poisson: np.ndarray
-    by_held: np.ndarray
     releases: list[tuple[int, int]]
 
     @property
     def middle(self) -> np.ndarray:
-        """Of the prior, (4 + R,)."""
-        return np.concatenate([START, [0.0], np.full(len(self.releases), OPENS)])
+        """Of the prior, (3 + R,)."""
+        return np.concatenate([START, np.full(len(self.releases), OPENS)])
 
     @property
     def reach(self) -> np.ndarray:
-        """Its standard deviation, (4 + R,)."""
-        return np.concatenate([SPREAD, [HELD], np.full(len(self.releases), LATE)])
+        """Its standard deviation, (3 + R,)."""
+        return np.concatenate([SPREAD, np.full(len(self.releases), LATE)])
 
     def bounded(self, y: np.ndarray) -> np.ndarray:
-        return np.concatenate(
-            [bounded(y[:3], self.clip), np.clip(y[3:4], -4 * HELD, 4 * HELD), np.clip(y[4:], EARLIEST, LATEST)]
-        )
+        return np.concatenate([bounded(y[:3], self.clip), np.clip(y[3:], EARLIEST, LATEST)])
 
     def tracks(self, y: np.ndarray, body: int = 0) -> np.ndarray:
         """Displacement of the points [m], (K, T_fit, 3)."""
         rates = np.array([y[0], self.x[1], y[2]])
-        clip = set_to(self.clip, np.concatenate([rates, self.x[3:4], y[4:]]), self.releases)
+        clip = set_to(self.clip, np.concatenate([rates, y[3:]]), self.releases)
         result = self.simulated.copy()
         for first, last in _windows(self.clip):
             what = ["short", self.x.tolist(), rates.tolist(), first, last, *clip.kind]
@@ -242,7 +277,7 @@ class _Around:
                 lambda f=first, t=last: {"seen": _short(clip, self.bodies[body], rates, self.run, self.carry, f, t)},
             )["seen"]
             result[:, first + 1 : last + 1] = seen
-        return result + (y[1] - self.x[1]) * self.by_poisson + (y[3] - self.x[3]) * self.by_held
+        return result + (y[1] - self.x[1]) * self.by_poisson
 
     def left(self, y: np.ndarray, body: int = 0) -> np.ndarray | None:
         """Whitened residual, (N,); None where tissue like that is torn apart."""
@@ -258,15 +293,15 @@ class _Around:
         return float(self.space.gram(left[:, None], left[:, None])[0, 0] + prior)
 
     def slopes(self, y: np.ndarray) -> np.ndarray:
-        """Derivative of the points' displacement by y [m], (4 + R, K, T_fit, 3)."""
-        late = np.where(y[4:] > LATEST - 0.3, -0.2, 0.2)
+        """Derivative of the points' displacement by y [m], (3 + R, K, T_fit, 3)."""
+        late = np.where(y[3:] > LATEST - 0.3, -0.2, 0.2)
         aside = np.concatenate([[STEP[0]], [STEP[2]], late])
-        ways = np.eye(len(y))[[0, 2, *range(4, len(y))]]
+        ways = np.eye(len(y))[[0, 2, *range(3, len(y))]]
         middle, *moved = at_once(
             self.tracks, [y, *(y + a * e for a, e in zip(aside, ways, strict=True))], len(self.bodies)
         )
         stiffer, slower, *later = ((m - middle) / a for m, a in zip(moved, aside, strict=True))
-        return np.stack([stiffer, self.by_poisson, slower, self.by_held, *later])
+        return np.stack([stiffer, self.by_poisson, slower, *later])
 
     def normal(self, slopes: np.ndarray) -> np.ndarray:
         J = self.whiten(slopes).T
@@ -276,10 +311,11 @@ class _Around:
         """A few stiffnesses and viscosities, best first."""
         tries = [self.x]
         for e in STIFFNESSES:
-            for lag in LAGS:
+            for lag, late in [(lag, MOMENTS[1]) for lag in LAGS] + [(LAGS[1], MOMENTS[0]), (LAGS[1], MOMENTS[2])]:
                 y = self.x.copy()
-                y[[0, 2]] = START[0] + e, START[2] + lag
-                tries.append(self.bounded(y))
+                y[[0, 2]], y[3:] = (START[0] + e, START[2] + lag), late
+                if not (tries[0][3:].size == 0 and late != MOMENTS[1]):
+                    tries.append(self.bounded(y))
         costs = at_once(lambda y, body: self.cost(y, self.left(y, body)), tries, len(self.bodies))
         return [tries[n] for n in np.argsort(costs, kind="stable")]
 
@@ -288,7 +324,7 @@ class _Around:
         apart: list[np.ndarray] = []
         for y in self.starts():
             # Neighbours of a start end where it does.
-            if all(np.abs((y - z)[[0, 2]] / SPREAD[[0, 2]]).max() > 0.8 for z in apart):
+            if all(np.abs((y - z) / self.reach)[[0, 2, *range(3, len(y))]].max() > 0.6 for z in apart):
                 apart.append(y)
         ends, costs = [], []
         for y in apart[:DESCENTS_FROM]:
@@ -315,7 +351,7 @@ class _Around:
                 damping *= 8
             else:
                 return y
-            done = cost - cost_there < 0.5 or (n > 0 and cost_there - HOPE * (cost - cost_there) > bar)
+            done = cost - cost_there < 1.0 or (n > 0 and cost_there - HOPE * (cost - cost_there) > bar)
             y, left, cost, damping = there, left_there, cost_there, max(damping / 4, 1e-4)
             if done:
                 return y

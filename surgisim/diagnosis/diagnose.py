@@ -10,7 +10,7 @@ from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, judgement, nuisance, verdict
-from surgisim.diagnosis.base import fit_base
+from surgisim.diagnosis.base import fit_base, settled
 from surgisim.diagnosis.candidates import Parts, blocks, costly, finer
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.context import Case, workers
@@ -122,8 +122,11 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     whiten = whitener(noise, clip.rest, clip.seen[:, fitted], settings.offsets)
     drift = nuisance.drift_of(clip, noise, settings.offsets)
 
-    def beside(clip: Clip, x: np.ndarray, simulated: np.ndarray) -> np.ndarray:
+    def beside(clip: Clip, x: np.ndarray, simulated: np.ndarray, first: bool) -> np.ndarray:
         error = nuisance.error_of(clip, x, simulated, memo, settings)
+        if first:
+            # How a body of other numbers rings says nothing of how this one does.
+            error = error * nuisance.held(clip)[None, :, None]
         groups = nuisance.of_base(clip, simulated, error, drift, settings)
         return whitened(whiten, groups, until)
 
@@ -135,23 +138,11 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     groups = nuisance.of_laws(clip, base, error, drift, memo, settings, workers(clip, settings))
     fixed = whitened(whiten, groups, until)
     space = metric(np.concatenate([fixed, whiten(base.slopes).T], 1))
+    slopes = slice(fixed.shape[1], fixed.shape[1] + len(base.slopes))
+    base = settled(clip, whiten, space, slopes, base, memo)
     z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
     nulls = space.draw(np.random.default_rng(settings.seed), settings.nulls, whiten.known)
-    first = fixed.shape[1]
-    return Case(
-        clip,
-        settings,
-        noise,
-        whiten,
-        base,
-        space,
-        memo,
-        z,
-        nulls,
-        slice(first, first + len(base.slopes)),
-        groups,
-        drift,
-    )
+    return Case(clip, settings, noise, whiten, base, space, memo, z, nulls, slopes, groups, drift)
 
 
 def whitened(whiten: Whitener, groups: list[Group], until: int) -> np.ndarray:

@@ -43,7 +43,7 @@ class Finding:
 
 def judge(block: Block, whiten, space: Metric, cleared: np.ndarray, source: int, seen: np.ndarray) -> list[Finding]:
     """Every hypothesis of a block against residuals that `space` cleared, (N, 1 + D): the recording's, then nulls."""
-    white = whiten(block.columns).T.astype(np.float32)
+    white = whiten(block.columns.astype(np.float32)).T
     gram = space.gram(white, white)
     shadow = (white.T @ cleared).astype(float)
     mask = seen[None, :, :, None]

@@ -35,8 +35,7 @@ def nuisances(case: Case) -> list[dict[str, Any]]:
             {"name": f"opening of grip {j} after its last active frame", "value": late, "sd": 0.2, "unit": "frames",
              "said": True}
         )  # fmt: skip
-    held = {"name": "what is held ends beyond its box by", "value": case.clip.raised, "unit": "m", "said": True}
-    return [*result, held | {"sd": 5e-4}]
+    return result
 
 
 def drifted(case: Case) -> float | None:

@@ -98,12 +98,13 @@ class Whitener:
     """Orthonormal, what missing samples become, of one axis, (K T, L) float32."""
 
     def __call__(self, field: np.ndarray) -> np.ndarray:
-        """Of fields [m], (..., K, T, 3), as (..., K T 3) float64."""
-        scaled = field * (self.mask * self.scale[:, None])[..., None]
-        mode = np.tensordot(self.axes.T, np.moveaxis(scaled, -3, 0), (1, 0))
+        """Of fields [m], (..., K, T, 3), as (..., K T 3), in their own precision."""
+        kind = np.float32 if field.dtype == np.float32 else float
+        scaled = field * (self.mask * self.scale[:, None])[..., None].astype(kind)
+        mode = np.tensordot(self.axes.T.astype(kind), np.moveaxis(scaled, -3, 0), (1, 0))
         shape = mode.shape
         mode = np.moveaxis(mode, -2, 1).reshape(shape[0], shape[-2], int(np.prod(shape[1:-2])) * shape[-1])
-        white = self._known(self.inverse @ mode)
+        white = self._known(self.inverse.astype(kind, copy=False) @ mode)
         white = white.reshape(shape[0], shape[-2], *shape[1:-2], shape[-1])
         white = np.moveaxis(np.moveaxis(white, 1, -2), 0, -3)
         return white.reshape(*white.shape[:-3], int(np.prod(white.shape[-3:])))

@@ -38,7 +38,7 @@ RADIUS, CENTRE, PATH = 0.1, 5e-4, 1e-4
 """Of a grip's radius [1], of its centre [m], and of its path from moment to moment [m]."""
 SOON = 0.2
 """Of the moment of a release whose frames were fitted, about what came out [frames]: there tracks bend with it."""
-LAWS = ("corotated", "neo_hookean")
+LAWS = ("corotated",)
 """Elastic laws that tissue may follow instead of the base's; a standard deviation is the whole way to each."""
 FINER = 0.79
 """Spacing of the finer grid that tells the simulator's error, over that of the search."""
@@ -74,10 +74,10 @@ def of_laws(
     clip: Clip, base: Base, error: np.ndarray, drift: float, memo: Memo, settings: Diagnosing, workers: int
 ) -> list[Group]:
     """What laws are fitted with: the same, and grips, held tissue and elastic laws that may be others."""
-    near, held = base.tangent, HELD * by_held(clip, base.x, base.simulated, memo)
+    near, moved = base.tangent, HELD * by_held(clip, base.x, base.simulated, memo)
     groups = [*other_bodies(clip, base, memo, workers), firmness(clip, near), path(clip, near)]
-    if held.any():
-        groups.append(Group("held", held[None], (("where what is held ends", HELD, "m"),)))
+    if moved.any():
+        groups.append(Group("held", moved[None], (("where what is held ends", HELD, "m"),)))
     return of_base(clip, base.simulated, error, drift, settings) + chosen(groups, settings)
 
 
@@ -151,8 +151,8 @@ def simulator(clip: Clip, error: np.ndarray, share: float = 1.0) -> Group:
     values, axes = np.linalg.eigh(alike)
     order = np.argsort(values)[::-1][:PATTERNS]
     patterns = (axes[:, order] * np.sqrt(np.maximum(values[order], 0))).T
-    held = clip.motion.active.any(0) if len(clip.motion.active) else np.zeros(clip.frames, bool)
-    spans = [span for span in (held, ~held) if span.any()]
+    held_then = held(clip)
+    spans = [span for span in (held_then, ~held_then) if (error * span[None, :, None]).any()]
     result = [WHOLE * error, *(APART * error * span[None, :, None] for span in spans)]
     result += [BENT * error * p[:, None, None] for p in patterns]
     near = alike / alike.sum(1, keepdims=True)
@@ -164,6 +164,11 @@ def simulator(clip: Clip, error: np.ndarray, share: float = 1.0) -> Group:
     return Group("simulator", np.stack(result))
 
 
+def held(clip: Clip) -> np.ndarray:
+    """Frames in which a grip holds, (T,) bool."""
+    return clip.motion.active.any(0) if len(clip.motion.active) else np.zeros(clip.frames, bool)
+
+
 def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group]:
     """Grips of another size or place, or that open sooner, and tissue of another elastic law, by the engine."""
     motion, runs = clip.motion, []
@@ -172,9 +177,10 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
         if not motion.active[j].any():
             continue
         one = np.eye(len(motion.radius))[j]
+        shown = motion.active[j, : clip.until].any()
         larger = replace(motion, radius=motion.radius * (1 + RADIUS * one))
         runs.append(("grip radius", (f"radius of grip {j}", RADIUS, "1"), larger, None))
-        for axis, way in (("u", u), ("v", v)):
+        for axis, way in (("u", u), ("v", v)) if shown else ():
             by = CENTRE * one[:, None] * way
             aside = replace(motion, center_rest=motion.center_rest + by, position=motion.position + by[:, None])
             runs.append(("grip centre", (f"centre of grip {j} along {axis}", CENTRE, "m"), aside, None))

@@ -91,7 +91,9 @@ class Prepared:
         """
         spacing = self.simulator.grid.spacing
         laws = choose(self.terms)
-        base = {n: t.row(values[n]) for n, t in laws.items() if t.energy is not None}
+        local = self.places if places is None else places
+        # What is stiffer in one place only is no reason to hold everything more firmly.
+        base = {n: t.row(values[n]) for n, t in laws.items() if t.energy is not None and n not in local}
         alone = {n: laws[n] for n in base}
         shear, pressure = (of(alone, base, self.density) / spacing for of in (shear_speed, wave_speed))
         motion = replace(motion, radius=np.maximum(motion.radius, LEAST_GRIP * spacing))
