@@ -318,8 +318,9 @@ class _Around:
             for lag, late in [(lag, MOMENTS[1]) for lag in LAGS] + [(LAGS[1], MOMENTS[0]), (LAGS[1], MOMENTS[2])]:
                 y = self.x.copy()
                 y[[0, 2]], y[3:] = (START[0] + e, START[2] + lag), late
-                if not (tries[0][3:].size == 0 and late != MOMENTS[1]):
-                    tries.append(self.bounded(y))
+                # What may not be tried as it is is no start of its own; nor is a moment that nothing has.
+                if np.allclose(self.bounded(y), y) and (self.releases or late == MOMENTS[1]):
+                    tries.append(y)
         costs = at_once(lambda y, body: self.cost(y, self.left(y, body)), tries, len(self.bodies))
         return [tries[n] for n in np.argsort(costs, kind="stable")]
 

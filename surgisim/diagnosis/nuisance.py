@@ -24,9 +24,9 @@ LAG = 0.02
 """Standard deviation of the tracker's lag [s]: half a frame at 25 Hz."""
 SCALE = 0.03
 """Of the scale along each axis [1]: a focal length or a depth is known to some per cent."""
-DRIFT, DRIFT_SPREAD = 1.5e-4, 1.2
+DRIFT, DRIFT_SPREAD = 1.5e-4, 1.0
 """Median and spread (logarithm) of how far a camera drifts over a clip [m], before its rest has been looked at."""
-DRIFTS = np.geomspace(2e-5, 3e-3, 16)
+DRIFTS = np.geomspace(2e-5, 1.5e-3, 14)
 """Sizes that are weighed [m]."""
 WALKS = 3
 """Courses of a drift: the first of a random walk's (Karhunen and Loeve); the last goes to and fro 1.25 times."""
@@ -34,8 +34,9 @@ LEAST_REST = 6
 """Frames of rest from which a drift is learned."""
 FIRM = 0.15
 """Of how much more or less than all of its path a grip carries along [1]."""
-RADIUS, CENTRE, PATH = 0.1, 5e-4, 1e-4
-"""Of a grip's radius [1], of its centre [m], and of its path from moment to moment [m]."""
+RADIUS, HERE, CENTRE, PATH = 0.1, 1.0, 5e-4, 1e-4
+"""Of a grip's radius [1], of a factor of that which varies over the tissue, of its centre [m], and of its path from
+moment to moment [m]."""
 SOON = 0.2
 """Of the moment of a release whose frames were fitted, about what came out [frames]: there tracks bend with it."""
 LAWS = ("corotated",)
@@ -146,22 +147,33 @@ def simulator(clip: Clip, error: np.ndarray, share: float = 1.0) -> Group:
     if not error.any() or share == 0:
         return Group("simulator", np.zeros((0, *error.shape)))
     error = share * error
-    apart = np.linalg.norm(clip.rest[:, None] - clip.rest[None], axis=-1)
-    alike = np.exp(-0.5 * (apart / (ALIKE * clip.body.spacing)) ** 2)
-    values, axes = np.linalg.eigh(alike)
-    order = np.argsort(values)[::-1][:PATTERNS]
-    patterns = (axes[:, order] * np.sqrt(np.maximum(values[order], 0))).T
+    alike, patterns = _factors(clip)
     held_then = held(clip)
     spans = [span for span in (held_then, ~held_then) if (error * span[None, :, None]).any()]
     result = [WHOLE * error, *(APART * error * span[None, :, None] for span in spans)]
     result += [BENT * error * p[:, None, None] for p in patterns]
-    near = alike / alike.sum(1, keepdims=True)
+    result += _askew(error, spans, alike, patterns)
+    return Group("simulator", np.stack(result))
+
+
+def _factors(clip: Clip) -> tuple[np.ndarray, np.ndarray]:
+    """How alike a factor is at two points, (K, K), and its patterns, of unit variance at a point, (M, K)."""
+    apart = np.linalg.norm(clip.rest[:, None] - clip.rest[None], axis=-1)
+    alike = np.exp(-0.5 * (apart / (ALIKE * clip.body.spacing)) ** 2)
+    values, axes = np.linalg.eigh(alike)
+    order = np.argsort(values)[::-1][:PATTERNS]
+    return alike, (axes[:, order] * np.sqrt(np.maximum(values[order], 0))).T
+
+
+def _askew(error: np.ndarray, spans: list[np.ndarray], alike: np.ndarray, patterns: np.ndarray) -> list[np.ndarray]:
+    """What is as large as an error [m], (K, T, 3), in frames `spans`, (T,) each, and points anywhere."""
+    near, result = alike / alike.sum(1, keepdims=True), []
     for span in spans:
         square = (error**2).sum(-1) / 3 * span
         size = np.sqrt(near @ square.mean(1) * len(span) / span.sum())
         course = np.sqrt(square.mean(0) / max(square.mean(0)[span].mean(), 1e-30))
         result += [ASKEW * (p * size)[:, None, None] * course[None, :, None] * e for p in patterns for e in np.eye(3)]
-    return Group("simulator", np.stack(result))
+    return result
 
 
 def held(clip: Clip) -> np.ndarray:
@@ -214,7 +226,20 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
         if change is not None:
             before = groups.get(name, Group(name, np.zeros((0, *change.shape))))
             groups[name] = Group(name, np.concatenate([before.columns, change[None]]), (*before.values, told))
+    if "grip radius" in groups:
+        groups["grip radius"] = _not_a_ball(clip, groups["grip radius"])
     return list(groups.values())
+
+
+def _not_a_ball(clip: Clip, radius: Group) -> Group:
+    """Grips larger here and smaller there: what a grip holds ends where no grid, mesh or jaw says exactly."""
+    (alike, patterns), columns = _factors(clip), [radius.columns]
+    shown = {f"radius of grip {j}" for j, on in enumerate(clip.motion.active) if on[: clip.until].any()}
+    for one, (name, *_) in zip(radius.columns, radius.values, strict=True):
+        if name in shown:
+            columns.append(HERE * one * patterns[:, :, None, None])
+            columns.append(np.stack(_askew(HERE / ASKEW / 2 * one, [np.ones(clip.frames, bool)], alike, patterns)))
+    return replace(radius, columns=np.concatenate(columns))
 
 
 def firmness(clip: Clip, near) -> Group:
