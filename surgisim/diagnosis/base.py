@@ -115,7 +115,8 @@ def longest_lag(log_E: float, clip: Clip) -> float:
 
 def fit_base(
     clip: Clip, whiten: Whitener, nuisances: Callable[[Clip, np.ndarray, np.ndarray, bool], np.ndarray], memo: Memo, *,
-    rounds: int = ROUNDS, workers: int = 1, timing: bool = True, say: Callable[[str], None] = lambda text: None,
+    rounds: int = ROUNDS, workers: int = 1, timing: bool = True, begun: np.ndarray | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> tuple[Clip, Base]:  # fmt: skip
     """E, nu and eta, and when grips open; the clip with the latter, and the base.
 
@@ -125,7 +126,8 @@ def fit_base(
     releases are free.
     """
     releases = clip.releases() if timing else []
-    y, promised = np.concatenate([START, np.full(len(releases), OPENS)]), np.inf
+    late = [float(clip.opening[j, t]) for j, t in releases]
+    y, promised = np.concatenate([START if begun is None else begun, late]), np.inf
     bodies = [clip.prepared(TERMS) for _ in range(workers)]
     prepared = bodies[0]
     carry = prepared.simulator.carry(clip.rest)
@@ -139,14 +141,14 @@ def fit_base(
         simulated = carried(carry, run)
         near = tangent(prepared, values_of(y[:3]), drive, run, clip.rest, clip.until)
         if n < 2:
-            space = metric(nuisances(clip, y[:3], simulated, n == 0))
+            space = metric(nuisances(clip, y[:3], simulated, n == 0 and begun is None))
         around = _Around(
             clip, whiten, space, memo, bodies, carry, y.copy(), run, simulated[:, : clip.until],
             _by_poisson(prepared, near, y[:3]), releases,
         )  # fmt: skip
         if n > 0 and (n == rounds or around.cost(y, around.left(y)) < promised + AGAIN):
             break
-        y = around.best(say) if n == 0 else around.descend(y, say)
+        y = around.best(say) if n == 0 and begun is None else around.descend(y, say)
         promised = around.cost(y, around.left(y))
     slopes = around.slopes(y)
     spread = np.sqrt(np.diag(np.linalg.inv(around.normal(slopes))))[:3]

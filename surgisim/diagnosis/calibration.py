@@ -35,6 +35,9 @@ FITTED_MISFIT = 0.03
 """Share of the explained chi square that a law still leaves wrong once the engine has fitted it."""
 ALIKE = 0.85
 """|cos| of whitened signatures beyond which two laws are not told apart."""
+NEAR = 0.37
+"""Share of a law's probability, one unit of temperature, that a simpler one that does the same may have and be preferred:
+a push that stays and points down is a weight."""
 LITTLE_LEFT = 0.1
 """Share of the explainable misfit beside a first law below which no second one is looked for."""
 SURE = 0.5

@@ -42,6 +42,11 @@ class Case:
     drift: float
     """How far the camera drifts over the clip, as its rest shows [m]."""
 
+    @property
+    def misfit(self) -> float:
+        """Chi square of the base beside everything that is no physics."""
+        return float(self.space.gram(self.z[:, None], self.z[:, None])[0, 0])
+
     @cached_property
     def flexible(self) -> Flexible:
         """What any smooth residual could gain."""

@@ -10,7 +10,7 @@ from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, judgement, nuisance, verdict
-from surgisim.diagnosis.base import fit_base, settled
+from surgisim.diagnosis.base import HELD, fit_base, settled
 from surgisim.diagnosis.candidates import Parts, blocks, costly, finer
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.context import Case, workers
@@ -25,9 +25,13 @@ from surgisim.diagnosis.nuisance import Group
 from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
 from surgisim.diagnosis.together import Together, needed, together
 from surgisim.estimation.trial import at_once
+from surgisim.mpm.simulator import Breakdown
+from surgisim.problem import Problem
 from surgisim.recordings.recording import Recording
 
 Progress = Callable[[float, float, str], None]
+MOST_HELD = 4e-3
+"""How far what is held may end from where its box does [m]."""
 FIRSTS = 2
 """Laws beside which a second one is looked for."""
 
@@ -130,19 +134,32 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
         groups = nuisance.of_base(clip, simulated, error, drift, settings)
         return whitened(whiten, groups, until)
 
-    clip, base = fit_base(
-        clip, whiten, beside, memo, workers=workers(clip, settings), timing="release" not in settings.without,
-        say=lambda text: progress(0.1, 1, text),
-    )  # fmt: skip
-    error = nuisance.error_of(clip, base.x, base.simulated, memo, settings)
-    groups = nuisance.of_laws(clip, base, error, drift, memo, settings, workers(clip, settings))
-    fixed = whitened(whiten, groups, until)
-    space = metric(np.concatenate([fixed, whiten(base.slopes).T], 1))
-    slopes = slice(fixed.shape[1], fixed.shape[1] + len(base.slopes))
-    base = settled(clip, whiten, space, slopes, base, memo)
-    z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
-    nulls = space.draw(np.random.default_rng(settings.seed), settings.nulls, whiten.known)
-    return Case(clip, settings, noise, whiten, base, space, memo, z, nulls, slopes, groups, drift)
+    def placed(clip: Clip, begun: np.ndarray | None) -> Case:
+        clip, base = fit_base(
+            clip, whiten, beside, memo, workers=workers(clip, settings), timing="release" not in settings.without,
+            begun=begun, say=lambda text: progress(0.1, 1, text),
+        )  # fmt: skip
+        error = nuisance.error_of(clip, base.x, base.simulated, memo, settings)
+        groups = nuisance.of_laws(clip, base, error, drift, memo, settings, workers(clip, settings))
+        fixed = whitened(whiten, groups, until)
+        space = metric(np.concatenate([fixed, whiten(base.slopes).T], 1))
+        slopes = slice(fixed.shape[1], fixed.shape[1] + len(base.slopes))
+        base = settled(clip, whiten, space, slopes, base, memo)
+        z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
+        nulls = space.draw(np.random.default_rng(settings.seed), settings.nulls, whiten.known)
+        return Case(clip, settings, noise, whiten, base, space, memo, z, nulls, slopes, groups, drift)
+
+    case = placed(clip, None)
+    off = nuisance.likely_held(case.groups, case.space.likely(case.z))
+    if abs(off) > nuisance.FAR_OFF:
+        # So far a plane's effect is not in proportion: what is held is laid anew, where it seems to end.
+        try:
+            moved = placed(case.clip.laid(raised=float(np.clip(off, -MOST_HELD, MOST_HELD))), case.base.x)
+        except (Problem, Breakdown):
+            return case
+        costs = [c.misfit + (c.clip.raised / HELD) ** 2 for c in (case, moved)]
+        case = moved if costs[1] < costs[0] else case
+    return case
 
 
 def whitened(whiten: Whitener, groups: list[Group], until: int) -> np.ndarray:

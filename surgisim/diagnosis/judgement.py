@@ -119,8 +119,8 @@ def _explanation(case: Case, fitted: Together, bend: Bend) -> Explanation:
 
 def judged(case: Case, laws: Scores, tried: list[Explanation], bend: Bend, over: Gain | None = None) -> Judgement:
     """Where something is detected. over: what is named gains over a placebo in the frames held out."""
-    chosen = stands(tried)
     chances = probabilities(laws, tried)
+    chosen = simplest(case, stands(tried), tried, chances)
     fitted, term = chosen.fitted, chosen.first.term
     total = max(explainable(bend), fitted.gain, 1e-9)
     explained = float(np.clip(fitted.gain / total, 0, 1))
@@ -154,6 +154,22 @@ def stands(tried: list[Explanation]) -> Explanation:
         if sound and (n == 0 or each.confirmed):
             return each
     return tried[0]
+
+
+def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances: dict[str, float]) -> Explanation:
+    """The explanation itself, or one of fewer numbers that does the same and is hardly less probable.
+
+    A law with a free direction fits what another leaves wrong as well as what is there; where both say the same of the
+    tissue, that the freer one gains a little more is no reason to prefer it.
+    """
+    size = chosen.first.finding.hypothesis.mix.shape[1]
+    for each in tried:
+        fewer = each.first.finding.hypothesis.mix.shape[1] < size
+        sound = len(each.fitted.refits) == len(chosen.fitted.refits) == 1 and not each.refuted
+        near = chances[each.first.term] > calibration.NEAR * chances[chosen.first.term]
+        if fewer and sound and near and cos(case, chosen.first, each.first) > calibration.ALIKE:
+            return each
+    return chosen
 
 
 def _reason(case: Case, chosen: Explanation, explained: float, took: float, over: Gain | None) -> str:

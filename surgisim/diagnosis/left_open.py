@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import cho_solve
 
+from surgisim.diagnosis.base import HELD
 from surgisim.diagnosis.context import Case
 
 TOLD = 0.7
@@ -35,6 +36,9 @@ def nuisances(case: Case) -> list[dict[str, Any]]:
             {"name": f"opening of grip {j} after its last active frame", "value": late, "sd": 0.2, "unit": "frames",
              "said": True}
         )  # fmt: skip
+    if case.clip.raised:
+        name = "where what is held was laid anew, beyond its box"
+        result.append({"name": name, "value": case.clip.raised, "sd": HELD, "unit": "m", "said": True})
     return result
 
 
@@ -60,6 +64,9 @@ def told(case: Case) -> list[str]:
         if not -0.3 < late < 1.3:
             way = "later" if late > 0 else "earlier"
             said.append(f"Grip {j} opens {abs(late):.1f} frames {way} than its last active frame says.")
+    if abs(case.clip.raised) > 1e-3:
+        way = "beyond" if case.clip.raised > 0 else "short of"
+        said.append(f"What is held seems to end {1e3 * abs(case.clip.raised):.1f} mm {way} its box.")
     for name in case.base.bound:
         said.append(f"{name} came to the end of what is tried: the recording does not tell it.")
     return said

@@ -30,6 +30,8 @@ STRETCH = 24
 """Frames of a stretch where no frames are known to be still."""
 SEEN = 0.6
 """Share of a stretch in which a point must be seen to tell of the noise there."""
+MOST_RUNS = 400
+"""Likelihoods computed at most for a fit."""
 FILLINGS = 3
 """How often missing samples are drawn anew and the numbers fitted again, where samples are missing."""
 
@@ -185,7 +187,7 @@ def estimate(moved: np.ndarray, seen: np.ndarray, rest: np.ndarray, still: np.nd
     x = START
     for n in range(FILLINGS if gaps else 1):
         filled = [part.filled(noise, rng) for part in parts]
-        x = _fitted(filled, x, 420 if n == 0 else 160)
+        x = _fitted(filled, x, MOST_RUNS)
         noise = Noise(level, **_unpacked(x))
     return noise
 
@@ -252,9 +254,7 @@ def _fitted(data: list, x: np.ndarray, most: int) -> np.ndarray:
             total += 0.5 * float((white**2).sum()) + 3 * float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum())
         return total
 
-    simplex = x + np.vstack([np.zeros(len(x)), 0.5 * np.eye(len(x))])
-    options = {"maxfev": most, "xatol": 0.03, "fatol": 0.5, "initial_simplex": simplex}
-    return minimize(cost, x, method="Nelder-Mead", options=options).x
+    return minimize(cost, x, method="L-BFGS-B", options={"maxfun": most, "ftol": 1e-7, "eps": 1e-4}).x
 
 
 START = np.array([-1.2, np.log(0.006), -3.0, -3.0, 1.0, 0.0, -1.2, 1.0, -0.8])

@@ -41,6 +41,8 @@ SOON = 0.2
 """Of the moment of a release whose frames were fitted, about what came out [frames]: there tracks bend with it."""
 LAWS = ("corotated",)
 """Elastic laws that tissue may follow instead of the base's; a standard deviation is the whole way to each."""
+FAR_OFF = 0.8e-3
+"""Beyond which what is held is laid anew [m]."""
 FINER = 0.79
 """Spacing of the finer grid that tells the simulator's error, over that of the search."""
 WHOLE, APART, BENT, ASKEW = 1.5, 0.75, 0.5, 0.3
@@ -85,6 +87,16 @@ def of_laws(
 def chosen(groups: list[Group], settings: Diagnosing) -> list[Group]:
     """Those that are not left out, and that act."""
     return [g for g in groups if g.name not in settings.without and len(g.columns)]
+
+
+def likely_held(groups: list[Group], likely: np.ndarray) -> float:
+    """How far beyond its box what is held seems to end [m]; likely: of all columns, the groups' first, (M,)."""
+    at = 0
+    for group in groups:
+        if group.name == "held":
+            return HELD * float(likely[at])
+        at += len(group.columns)
+    return 0.0
 
 
 def camera(clip: Clip, simulated: np.ndarray) -> list[Group]:
