@@ -23,7 +23,7 @@ from surgisim.diagnosis.prospect import Gain
 from surgisim.diagnosis.refit import Refit
 from surgisim.diagnosis.together import Together, least, prediction
 
-REASONS = ("named", "faint", "loose", "drawn", "little", "unconfirmed", "refuted", "beaten", "unclear")
+REASONS = ("named", "faint", "loose", "drawn", "little", "unconfirmed", "refuted", "beaten")
 
 
 @dataclass(frozen=True)

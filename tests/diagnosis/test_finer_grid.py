@@ -5,13 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from planted import GRID, recording
+from planted import GRID, TILT, case_of, memo_of, recording
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration
 from surgisim.diagnosis.clip import clip_of
-from surgisim.diagnosis.diagnose import diagnose, hazy, prepare_case
-from surgisim.diagnosis.evidence import Finding
+from surgisim.diagnosis.diagnose import diagnose, hazy
+from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import law_of, respond
 from surgisim.diagnosis.memo import Memo
@@ -23,11 +23,9 @@ FINE, WEIGHT = 0.18, np.array([8.0, 0.0, 0.0])
 
 
 @pytest.fixture(scope="module")
-def case(tmp_path_factory):
-    clip = clip_of(recording(values={"gravity": {"x": 8.0, "y": 0.0, "z": 0.0, "onset": -1.0}}), share=GRID)
+def case():
     # One folder for both grids: a run of the one must not pass for a run of the other.
-    memo = Memo(tmp_path_factory.mktemp("work"), "a recording")
-    return prepare_case(clip, Diagnosing(grid=GRID, replay=FINE, nulls=8), memo, lambda *_: None)
+    return case_of(recording(values=TILT), replay=FINE)
 
 
 @pytest.fixture(scope="module")
@@ -57,13 +55,13 @@ def test_no_replay_on_a_grid_that_is_not_finer(case, named):
     assert replayed(replace(case, settings=Diagnosing(grid=GRID, replay=GRID)), named, None) is None
 
 
-def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_finer_grid(tmp_path, monkeypatch):
+def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_finer_grid(monkeypatch):
     plain = Diagnosing(grid=GRID, replay=0.21, nulls=8, experiment=False, free=0, second=False)
     made, said = recording(), []
 
     def spacing(**settings):
         chosen = plain.model_copy(update=settings)
-        found, *_ = diagnose(made, chosen, lambda share, _, text: said.append((share, text)), Memo(tmp_path, ""))
+        found, *_ = diagnose(made, chosen, lambda share, _, text: said.append((share, text)), memo_of(made))
         return 1e-3 * found.global_test["spacing"]["value"]
 
     coarse, fine = (clip_of(made, share=share).body.spacing for share in (GRID, 0.21))
@@ -79,4 +77,5 @@ def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_fi
 
 @pytest.mark.parametrize(("evidence", "strained", "wanted"), [(49, True, True), (51, True, False), (49, False, False)])
 def test_a_law_that_is_clear_needs_no_finer_grid(evidence, strained, wanted):
-    assert hazy(SimpleNamespace(strained=strained), {"gravity": (evidence,), "tether": (3.0,)}) == wanted
+    laws = {"gravity": evidence, "tether": 3.0}
+    assert hazy(SimpleNamespace(strained=strained), {term: Score(e, np.zeros(1), []) for term, e in laws.items()}) == wanted
