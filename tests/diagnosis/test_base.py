@@ -72,18 +72,19 @@ def test_a_body_is_found_within_what_is_said_of_it():
 
 @pytest.fixture(scope="module")
 def let_go_late():
-    return recording(fps=QUICK, late=LATE)
+    return recording(fps=QUICK, late=LATE, sigma=4e-5)
 
 
 def test_a_release_that_falls_between_frames_is_found_and_the_stiffness_with_it(let_go_late):
     case = case_of(let_go_late)
-    assert case.clip.opening[0, 17] == pytest.approx(LATE, abs=0.25)
-    assert abs(case.base.x[0] - TRUE[0]) < max(2.5 * case.base.spread[0], 0.1)
-    assert case.base.spread[0] < 0.3 * SPREAD[0]
+    assert case.clip.opening[0, 17] == pytest.approx(LATE, abs=0.1)
+    assert case.base.x[0] == pytest.approx(TRUE[0], abs=0.2)
+    assert (np.abs(case.base.x - TRUE) < 2.5 * case.base.spread).all()
 
 
-def test_a_release_taken_to_fall_elsewhere_fits_worse(let_go_late):
+def test_a_release_taken_to_fall_elsewhere_gives_another_body_that_fits_worse(let_go_late):
     case, other = case_of(let_go_late), case_of(let_go_late, without=["release"])
     assert other.clip.opening[0, 17] == OPENS
+    assert abs(other.base.x[0] - TRUE[0]) > 0.5
     chi = [float(c.space.gram(c.z[:, None], c.z[:, None])[0, 0]) for c in (case, other)]
-    assert chi[1] > chi[0] + 25
+    assert chi[1] > chi[0] + 100

@@ -52,7 +52,7 @@ def test_deep_inside_nothing_is_said():
 
 
 def test_what_draws_tissue_outward_is_not_called_a_contact():
-    settings = Diagnosing(grid=GRID, nulls=8, experiment=False, free=0, second=False)
+    settings = Diagnosing(grid=GRID, nulls=8, experiment=False, free=0, second=False, refine=1)
     push = {"hidden_contact": {"force": 0.12, "yaw": 0.3, "pitch": 0.2, "onset": 0.7, "end": 1.4}}
     planted = recording(push, {"hidden_contact": BLOB})
     drawn, physics, _ = diagnose(planted, settings, lambda *_: None, memo_of(planted))
@@ -60,7 +60,7 @@ def test_what_draws_tissue_outward_is_not_called_a_contact():
     assert drawn.verdict == "unexplained"
     assert drawn.effects[0]["probability"] < 0.5
     assert "hidden_contact" not in physics.terms
-    assert "draws the tissue out of its surface near" in drawn.words
+    assert "draws the tissue out of its surface at 1" in drawn.words
 
 
 def test_a_push_that_stays_comes_out_with_the_sign_it_has():

@@ -8,7 +8,7 @@ import pytest
 from planted import GRID, TILT, case_of, memo_of, recording
 
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis import calibration
+from surgisim.diagnosis import base, calibration
 from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.diagnose import diagnose, hazy
 from surgisim.diagnosis.evidence import Finding, Score
@@ -39,7 +39,7 @@ def named(case):
 
 def test_a_replay_is_the_engines_on_the_finer_grid(case, named):
     shown = replayed(case, named, named)
-    fine = clip_of(case.clip.recording, share=FINE)
+    fine = replace(clip_of(case.clip.recording, share=FINE), late=case.clip.late)
     law = law_of(named.refits[0].finding.hypothesis, WEIGHT, fine)
     assert shown.clip.body.spacing == fine.body.spacing < case.clip.body.spacing
     assert np.array_equal(shown.clip.rest, case.clip.rest)
@@ -56,20 +56,13 @@ def test_no_replay_on_a_grid_that_is_not_finer(case, named):
 
 
 def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_finer_grid(monkeypatch):
-    plain = Diagnosing(grid=GRID, replay=0.21, nulls=8, experiment=False, free=0, second=False)
-    made, said = recording(), []
-
-    def spacing(**settings):
-        chosen = plain.model_copy(update=settings)
-        found, *_ = diagnose(made, chosen, lambda share, _, text: said.append((share, text)), memo_of(made))
-        return 1e-3 * found.global_test["spacing"]["value"]
-
-    coarse, fine = (clip_of(made, share=share).body.spacing for share in (GRID, 0.21))
+    plain = Diagnosing(grid=GRID, replay=0.21, nulls=8, experiment=False, free=0, second=False, refine=1)
+    monkeypatch.setattr(base, "DESCENTS_FROM", 1)
     monkeypatch.setattr(calibration, "STRAINED", 0.0)
-    # A replay's grid that is no finer is none to look at again.
-    assert spacing(replay=GRID) == pytest.approx(coarse)
-    said.clear()
-    assert spacing() == pytest.approx(fine)
+    made, said = recording(), []
+    found, *_ = diagnose(made, plain, lambda share, _, text: said.append((share, text)), memo_of(made))
+    fine = clip_of(made, share=0.21).body.spacing
+    assert 1e-3 * found.global_test["spacing"]["value"] == pytest.approx(fine)
     shares = [share for share, _ in said]
     assert shares == sorted(shares)
     assert sum(text.endswith("on a finer grid") for _, text in said) > 10
@@ -78,4 +71,7 @@ def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_fi
 @pytest.mark.parametrize(("evidence", "strained", "wanted"), [(49, True, True), (51, True, False), (49, False, False)])
 def test_a_law_that_is_clear_needs_no_finer_grid(evidence, strained, wanted):
     laws = {"gravity": evidence, "tether": 3.0}
-    assert hazy(SimpleNamespace(strained=strained), {term: Score(e, np.zeros(1), []) for term, e in laws.items()}) == wanted
+    assert (
+        hazy(SimpleNamespace(strained=strained), {term: Score(e, np.zeros(1), []) for term, e in laws.items()})
+        == wanted
+    )

@@ -18,18 +18,22 @@ from surgisim.physics.place import Place
 BETTER, WORSE, ALIKE, BLIND = (
     Gain(60.0, 30.0, 90.0, 70.0), Gain(-60.0, -90.0, -30.0, 70.0), Gain(5.0, -20.0, 30.0, 70.0), Gain(0.1, -1, 1, 2.0)
 )  # fmt: skip
-CASE = SimpleNamespace(settings=SimpleNamespace(calibrated=True), strained=False)
+CASE, UNCALIBRATED = (
+    SimpleNamespace(settings=SimpleNamespace(calibrated=known), strained=False) for known in (True, False)
+)
 
 
 def explanation(term="gravity", evidence=90.0, ahead=BETTER, left=0.05, out=None) -> Explanation:
     place = Place((0.0, 0.0, 0.0), 0.003) if term == "hidden_contact" else None
-    finding = Finding(Hypothesis(term, np.eye(3), 0, place), evidence, np.ones(3), np.ones(3), 100.0, np.zeros(1), 0, 1e-4)
+    finding = Finding(
+        Hypothesis(term, np.eye(3), 0, place), evidence, np.ones(3), np.ones(3), 100.0, np.zeros(1), 0, 1e-4
+    )
     one = Refit(finding, np.ones(3), np.zeros((1, 1, 3)), 100.0, evidence)
     return Explanation(Together([one], np.zeros((1, 1, 3)), 100.0, np.zeros(3)), evidence, ahead, left, out)
 
 
-def reason(chosen: Explanation, explained=0.9, took=0.9, over=None) -> str:
-    return judgement._reason(CASE, chosen, explained, took, over)
+def reason(chosen: Explanation, explained=0.9, took=0.9, over=None, case=CASE) -> str:
+    return judgement._reason(case, chosen, explained, took, over)
 
 
 def test_what_frames_held_out_refute_gives_way_to_the_next_that_they_confirm():
@@ -71,6 +75,7 @@ def test_a_law_is_not_named_for_little():
     assert reason(explanation(), explained=0.5) == "little"
     assert reason(explanation(evidence=CLEAR - 1), took=0.1) == "faint"
     assert reason(explanation(evidence=CLEAR + 1), took=0.1) == "named"
+    assert reason(explanation(evidence=CLEAR - 1), took=0.1, case=UNCALIBRATED) == "named"
 
 
 def test_a_tie_with_a_placebo_is_no_defeat():

@@ -64,7 +64,7 @@ def test_a_law_that_came_out_as_nothing_is_dropped_and_one_that_says_something_i
     assert case.base.simulated + kept.refits[0].response == pytest.approx(kept.moved)
     both = fitted(strand, weight)
     # So little of the strands shows in a pull that hardly runs along them: they stay or go with what is asked.
-    assert 0.5 * (both.gain - fitted(weight).gain) == pytest.approx(9.3, abs=3.0)
+    assert 3.0 < 0.5 * (both.gain - fitted(weight).gain) < 25.0
     monkeypatch.setattr(calibration, "THRESHOLD", 3.0)
     assert needed(case, both) is both
     monkeypatch.setattr(calibration, "THRESHOLD", 25.0)
