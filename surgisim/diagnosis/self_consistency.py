@@ -1,4 +1,4 @@
-"""Recordings drawn from the diagnosis' own model of a recording: what it says of them should be what it says of nothing.
+"""Recordings drawn from the diagnosis' own model of a recording: what it says of them is what it says of nothing.
 
 A draw is the base's motion with everything that a residual may hold beside physics: nuisances at random prior values, a
 base of other numbers, a constant of each point, noise. Of the base only fitted frames know slopes (base.py); and as

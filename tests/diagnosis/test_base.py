@@ -42,7 +42,7 @@ def test_ever_stiffer_bodies_are_tried_until_one_stands(monkeypatch):
 
 @pytest.mark.parametrize(("dearer", "softest"), [(1.5, True), (2.5, False)])
 def test_of_bodies_that_look_alike_the_softest_is_taken(dearer, softest):
-    soft, stiff = (START + [by, 0.0, 0.0] for by in (-1.0, 1.0))
+    soft, stiff = (START + by * np.eye(3)[0] for by in (-1.0, 1.0))
     around = SimpleNamespace(
         reach=SPREAD, releases=[], starts=lambda: [stiff, soft], left=lambda y: None,
         descend=lambda y, *_: y, cost=lambda y, left: 100.0 + dearer * (y[0] < START[0]),

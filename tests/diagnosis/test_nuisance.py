@@ -1,4 +1,4 @@
-"""What a recording leaves open explains itself, and nothing else does; noise and nuisances drawn from the model fit it."""
+"""What a recording leaves open explains itself; noise and nuisances drawn from the model fit it."""
 
 from dataclasses import replace
 
