@@ -46,5 +46,3 @@ PULLS = 0.2
 8 degrees, contacts at -.94 to -.17, second grips at .34 to .93 (seed 906)."""
 SHOWS = 1.6
 """Times the noise beyond which a misfit on held-out frames must be cut by a law that is right."""
-PREDICTED = 0.15
-"""Share of it, in mean squares, that it must cut at least: laws that are right cut .6 to .95, wrong ones 0 to .04."""
