@@ -8,9 +8,10 @@ import pytest
 from planted import GRID, TILT, case_of, memo_of, recording
 
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis import base, calibration
+from surgisim.diagnosis import calibration
+from surgisim.diagnosis import diagnose as diagnosing
 from surgisim.diagnosis.clip import clip_of
-from surgisim.diagnosis.diagnose import diagnose, hazy
+from surgisim.diagnosis.diagnose import hazy
 from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import law_of, respond
@@ -56,16 +57,25 @@ def test_no_replay_on_a_grid_that_is_not_finer(case, named):
 
 
 def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_finer_grid(monkeypatch):
-    plain = Diagnosing(grid=GRID, replay=0.21, nulls=8, experiment=False, free=0, second=False, refine=1)
-    monkeypatch.setattr(base, "DESCENTS_FROM", 1)
+    settings = Diagnosing(grid=GRID, replay=0.21, nulls=8, experiment=False, free=0, second=False, refine=1)
+    first_look, looked, said, made = diagnosing.first_look, [], [], recording()
+
+    def look(recording, chosen, memo, progress):
+        looked.append((chosen.grid, memo.about))
+        progress(0.1, 1, "noise")
+        progress(0.5, 1, "trying")
+        # What a finer grid would show is not looked at here: the coarse one stands for it.
+        return first_look(recording, settings, memo_of(made), lambda *_: None)
+
     monkeypatch.setattr(calibration, "STRAINED", 0.0)
-    made, said = recording(), []
-    found, *_ = diagnose(made, plain, lambda share, _, text: said.append((share, text)), memo_of(made))
-    fine = clip_of(made, share=0.21).body.spacing
-    assert 1e-3 * found.global_test["spacing"]["value"] == pytest.approx(fine)
+    monkeypatch.setattr(diagnosing, "first_look", look)
+    diagnosing.diagnose(made, settings, lambda share, _, text: said.append((share, text)), memo_of(made))
+    (coarse, about), (fine, about_finer) = looked
+    assert (coarse, fine) == (GRID, 0.21)
+    assert about != about_finer
     shares = [share for share, _ in said]
     assert shares == sorted(shares)
-    assert sum(text.endswith("on a finer grid") for _, text in said) > 10
+    assert [text for _, text in said[2:4]] == ["noise, on a finer grid", "trying, on a finer grid"]
 
 
 @pytest.mark.parametrize(("evidence", "strained", "wanted"), [(49, True, True), (51, True, False), (49, False, False)])
