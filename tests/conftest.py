@@ -7,6 +7,8 @@ import pytest
 
 # Before torch is imported anywhere: on a busy machine its idle threads, spinning, would keep both cores from working.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+# Before numpy is: threads of its small matrices would wait for one another, where several tests or runs share cores.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 SHARED = Path(__file__).parents[2] / "shared"
 

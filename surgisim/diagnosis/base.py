@@ -348,21 +348,34 @@ class _Around:
             slopes = self.slopes(y)
             normal = self.normal(slopes)
             pull = self.space.gram(self.whiten(slopes).T, left[:, None])[:, 0] - (y - self.middle) / self.reach**2
-            for _ in range(4):
-                step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), pull)
-                there = self.bounded(y + np.clip(step, -1.2 * self.reach, 1.2 * self.reach))
-                left_there = self.left(there)
-                cost_there = self.cost(there, left_there)
-                if cost_there < cost:
-                    break
-                damping *= 8
-            else:
+            found = self.downhill(y, cost, normal, pull, damping)
+            if found is None:
                 return y
+            there, left_there, cost_there, damping = found
             done = cost - cost_there < 1.0 or (n > 0 and cost_there - HOPE * (cost - cost_there) > bar)
             y, left, cost, damping = there, left_there, cost_there, max(damping / 4, 1e-4)
             if done:
                 return y
         return y
+
+    def downhill(self, y: np.ndarray, cost: float, normal: np.ndarray, pull: np.ndarray, damping: float):
+        """The first damped step that costs less: numbers, residual, cost and damping; None where there is none.
+
+        A grip that opens before a frame instead of in it shows there at once, which no slope foretells: where a step
+        runs into that, moments of release stay and the body alone moves.
+        """
+        for free in sorted({len(y), 3}, reverse=True):
+            inner, more = normal[:free, :free], damping
+            for _ in range(4):
+                step = np.zeros(len(y))
+                step[:free] = np.linalg.solve(inner + more * np.diag(np.diag(inner)), pull[:free])
+                there = self.bounded(y + np.clip(step, -1.2 * self.reach, 1.2 * self.reach))
+                left = self.left(there)
+                less = self.cost(there, left)
+                if less < cost:
+                    return there, left, less, more
+                more *= 8
+        return None
 
 
 def _standing(prepared: Prepared, clip: Clip, x: np.ndarray, memo: Memo, frames: int):

@@ -36,8 +36,8 @@ FITTED_MISFIT = 0.03
 ALIKE = 0.85
 """|cos| of whitened signatures beyond which two laws are not told apart."""
 NEAR = 0.37
-"""Share of a law's probability, one unit of temperature, that a simpler one that does the same may have and be preferred:
-a push that stays and points down is a weight."""
+"""Share of a law's probability, one unit of temperature, that a simpler one that does the same may have and be
+preferred: a push that stays and points down is a weight."""
 LITTLE_LEFT = 0.1
 """Share of the explainable misfit beside a first law below which no second one is looked for."""
 SURE = 0.5
@@ -49,5 +49,3 @@ PULLS = 0.2
 8 degrees, contacts at -.94 to -.17, second grips at .34 to .93 (seed 906)."""
 SHOWS = 1.6
 """Times the noise beyond which a misfit on held-out frames must be cut by a law that is right."""
-PREDICTED = 0.15
-"""Share of it, in mean squares, that it must cut at least: laws that are right cut .6 to .95, wrong ones 0 to .04."""

@@ -23,7 +23,7 @@ from surgisim.diagnosis.prospect import Gain
 from surgisim.diagnosis.refit import Refit
 from surgisim.diagnosis.together import Together, least, prediction
 
-REASONS = ("named", "faint", "loose", "drawn", "little", "unconfirmed", "refuted", "beaten", "unclear")
+REASONS = ("named", "faint", "loose", "drawn", "little", "unconfirmed", "refuted", "beaten")
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Judgement:
     chances: dict[str, float]
     """Law -> probability."""
     explained: float
-    """Share of the misfit that can be told from noise, which what is named takes away."""
+    """Share of the misfit that can be told from noise, which what is named, or comes nearest, takes away."""
     after: np.ndarray
     """Displacement of the points with what is named [m], (K, T, 3)."""
     noise: Noise
@@ -117,8 +117,13 @@ def _explanation(case: Case, fitted: Together, bend: Bend) -> Explanation:
     return Explanation(fitted, fitted.refits[0].log_evidence, ahead, still(case, bend, fitted.moved), out)
 
 
-def judged(case: Case, laws: Scores, tried: list[Explanation], bend: Bend, over: Gain | None = None) -> Judgement:
-    """Where something is detected. over: what is named gains over a placebo in the frames held out."""
+def judged(
+    case: Case, laws: Scores, tried: list[Explanation], bend: Bend, over: Gain | None = None, worse: bool = False
+) -> Judgement:
+    """Where something is detected.
+
+    over: what is named gains over a placebo in the frames held out; worse: whether the error there rises with it.
+    """
     chances = probabilities(laws, tried)
     chosen = simplest(case, stands(tried), tried, chances)
     fitted, term = chosen.fitted, chosen.first.term
@@ -127,6 +132,8 @@ def judged(case: Case, laws: Scores, tried: list[Explanation], bend: Bend, over:
     noise = noise_beside(case, fitted.moved)
     took = taken(case, fitted.moved, noise.sigma)
     reason = _reason(case, chosen, explained, took, over)
+    if worse and reason == "named":
+        reason = "refuted"
     if reason == "faint":
         return nothing(case, laws, took)
     verdict = "named" if reason == "named" else "unexplained"
@@ -136,7 +143,8 @@ def judged(case: Case, laws: Scores, tried: list[Explanation], bend: Bend, over:
         verdict = "equivalence class"
     if verdict == "unexplained":
         # What explains little, or is not believed, is no more probable than that, and all other laws with it.
-        most = float(np.clip(min(explained, 1 - chosen.left, took) / 2, 0.0, 0.45))
+        explained = min(explained, 1 - chosen.left, took)
+        most = float(np.clip(explained / 2, 0.0, 0.45))
         if reason == "unconfirmed":
             most = 0.45
         scale = min(1.0, most / max(max(chances.values()), 1e-12))

@@ -185,7 +185,7 @@ def estimate(moved: np.ndarray, seen: np.ndarray, rest: np.ndarray, still: np.nd
         return noise
     gaps = any(not part.seen.all() for part in parts)
     x = START
-    for n in range(FILLINGS if gaps else 1):
+    for _ in range(FILLINGS if gaps else 1):
         filled = [part.filled(noise, rng) for part in parts]
         x = _fitted(filled, x, MOST_RUNS)
         noise = Noise(level, **_unpacked(x))

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.diagnosis.base import carried, simulate
-from surgisim.diagnosis.clip import Clip, clip_of
+from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.laws import IMPOSSIBLE, Clash, joined, law_of, respond
 from surgisim.diagnosis.together import Together
 from surgisim.estimation.trial import at_once
@@ -35,7 +35,7 @@ def replayed(case, named: Together, placebo: Together | None) -> Replay | None:
     share = case.settings.replay
     if share >= case.settings.grid:
         return None
-    clip = replace(case.clip, body=clip_of(case.clip.recording, share=share, device=case.clip.device).body)
+    clip = case.clip.laid(share=share)
     memo = case.memo.on(share)
 
     def bare(x: np.ndarray) -> np.ndarray:

@@ -7,7 +7,6 @@ import numpy as np
 
 from surgisim.diagnosis import calibration
 from surgisim.diagnosis.base import SPREAD, Base, bounded, carried, simulate
-from surgisim.diagnosis.errors import rms
 from surgisim.diagnosis.laws import IMPOSSIBLE, Clash, joined, law_of, respond
 from surgisim.diagnosis.refine import refined
 
@@ -47,8 +46,8 @@ def together(case, refits: list, say: Callable[[str], None], *, free: bool) -> T
     """One law as it was fitted; two fitted anew with all numbers of both and the base free, where `free`.
 
     Where that cannot be, because both need the same term, the base moves to where the metric puts it once the laws'
-    responses are taken off, and the engine runs again. What is no better than base and responses as they are, added,
-    on the fitted frames is not taken.
+    responses are taken off, and the engine runs again. What gains no more than base and responses as they are, added,
+    is not taken: chi square counts nuisances at their price, where a plain misfit takes what they do for the laws'.
     """
     plain = prediction(case, refits, case.base.simulated + sum(r.response for r in refits), refits[0].x)
     if len(refits) == 1 and refits[0].x is not None:
@@ -57,7 +56,7 @@ def together(case, refits: list, say: Callable[[str], None], *, free: bool) -> T
     tried = [plain, *(_freed(case, refits, say) if free and len(refits) > 1 else [])]
     if len(tried) == 1:
         tried += _moved(case, refits)
-    return min(tried, key=lambda t: rms(case, t.moved)[0])
+    return max(tried, key=lambda t: t.gain)
 
 
 def needed(case, both: Together) -> Together:

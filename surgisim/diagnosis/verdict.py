@@ -55,9 +55,7 @@ def write(
         wrong = placebo(case, fitted, refits, laws)
         over = None if wrong is None or case.prospect is None else case.prospect.gain(wrong.moved, fitted.moved)
         shown = beside_placebo(case, fitted, wrong)
-        said_of = judged(case, laws, tried, bend, over)
-        if said_of.named and worse(case, shown):
-            said_of = replace(said_of, verdict="unexplained", reason="refuted", after=base.simulated)
+        said_of = judged(case, laws, tried, bend, over, worse(case, shown))
         if not said_of.named:
             shown = replace(shown, after=shown.before, placebo=None)
     verdict, chances, named = said_of.verdict, said_of.chances, said_of.named
@@ -246,8 +244,9 @@ def _words(case: Case, said_of: Judgement, refits, laws, z, held_out: dict) -> s
     k, t = largest(z, case.clip.until)
     when = f"at {t / case.clip.fps:.2g} s ({PHASES[case.clip.phases()[t]]})"
     where = case.clip.rest[k].tolist()
+    left = 1 - said_of.explained if said_of.reason == "little" else chosen.left
     return words.unbelieved(
-        said_of.reason, chosen.first.term, said_of.chances[chosen.first.term], chosen.left, when, where
+        said_of.reason, chosen.first.term, said_of.chances[chosen.first.term], left, when, where
     ) + words.beside(told(case))
 
 

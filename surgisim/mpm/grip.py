@@ -133,5 +133,8 @@ def _carried_on(offset: np.ndarray, on: np.ndarray, late: np.ndarray) -> np.ndar
         ahead = max(math.ceil(late[last] - 1e-9), 0) if last + 1 < len(on) else 0
         step = offset[last] - offset[last - 1] if last > first else np.zeros(3)
         for n in range(1, min(ahead, len(on) - 1 - last) + 1):
+            # Where it grips anew, its path is given.
+            if on[last + n]:
+                break
             offset[last + n] = offset[last] + n * step
     return offset

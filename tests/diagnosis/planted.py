@@ -1,11 +1,20 @@
 """A small block of tissue whose recording the engine itself makes, with a law planted or none."""
 
+import hashlib
+import tempfile
+from functools import cache
+from pathlib import Path
+
 import numpy as np
 
 from surgisim.artifacts.motion import Motion
+from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis.base import SAFETY, carried, values_of
 from surgisim.diagnosis.clip import clip_of
+from surgisim.diagnosis.context import Case
+from surgisim.diagnosis.diagnose import prepare_case
 from surgisim.diagnosis.hypothesis import ease
+from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.noise import Noise
 from surgisim.physics.place import Place
 from surgisim.recordings.mesh import Mesh
@@ -26,8 +35,11 @@ def block() -> Mesh:
     return Mesh(corner, np.array(faces))
 
 
-def recording(values=None, places=None, seed=0, sigma=1.5e-4, grips=True) -> Recording:
-    """Pulled up and sideways from frame 4, held, let go at 17; `values` and `places` are what is planted."""
+def recording(values=None, places=None, seed=0, sigma=1.5e-4, fps=FPS, late=0.0) -> Recording:
+    """Pulled up and sideways from frame 4, held, let go at 17; `values` and `places` are what is planted.
+
+    late: how many frames after the last active one the grip opens.
+    """
     rng = np.random.default_rng(seed)
     side = np.stack(np.meshgrid(np.linspace(-0.016, 0.016, 8), np.linspace(-0.013, 0.013, 6)), -1).reshape(-1, 2)
     rest = np.concatenate([side, np.full((len(side), 1), SIZE[2])], 1)
@@ -39,7 +51,7 @@ def recording(values=None, places=None, seed=0, sigma=1.5e-4, grips=True) -> Rec
     )
     held = np.array([[[-0.1, -0.1, -1.0], [0.1, 0.1, 0.0025]]])
     made = Recording(
-        name="planted", fps=FPS, mesh=block(), boxes=held,
+        name="planted", fps=fps, mesh=block(), boxes=held,
         points=np.repeat(rest[:, None], FRAMES, 1).astype(np.float32),
         visible=np.ones((len(rest), FRAMES), bool), sigma=np.full(len(rest), sigma), motion=motion, density=1050.0,
         gravity=(0.0, 0.0, -9.81), place=rest, split={"fit": (0, FIT), "held_out": (FIT, FRAMES)},
@@ -48,8 +60,10 @@ def recording(values=None, places=None, seed=0, sigma=1.5e-4, grips=True) -> Rec
     values = {**values_of(TRUE), **(values or {})}
     prepared = clip.prepared(tuple(values))
     theta = prepared.theta(values, places or {})
-    per_frame = prepared.per_frame_of(prepared.stiffest(theta), FPS, SAFETY)
-    drive = prepared.drive(motion, values, fps=FPS, per_frame=per_frame, places=places or {})
+    per_frame = prepared.per_frame_of(prepared.stiffest(theta), fps, SAFETY)
+    drive = prepared.drive(
+        motion, values, fps=fps, per_frame=per_frame, places=places or {}, late=np.full((1, FRAMES), late)
+    )
     moved = carried(prepared.simulator.carry(rest), prepared.simulator.run(theta, drive))
     noise = Noise(level=np.full(len(rest), sigma), **NOISE).draw(rest, FRAMES, rng)
     points = rest[:, None] + moved + noise + 0.5 * sigma * rng.standard_normal((len(rest), 1, 3))
@@ -57,3 +71,29 @@ def recording(values=None, places=None, seed=0, sigma=1.5e-4, grips=True) -> Rec
 
 
 BLOB = Place((0.008, 0.006, 0.010), 0.0035)
+TILT = {"gravity": {"x": 8.0, "y": 0.0, "z": 0.0, "onset": -1.0}}
+"""Weight along x, from the first frame on [m/s^2]."""
+_RUNS = tempfile.TemporaryDirectory(prefix="planted-")
+
+
+def memo_of(made: Recording) -> Memo:
+    """Runs of a recording are made once, whichever test wants them."""
+    return Memo(Path(_RUNS.name), hashlib.sha256(made.points.tobytes()).hexdigest())
+
+
+def case_of(made: Recording, **settings) -> Case:
+    """Noise, base and nuisances of a recording."""
+    chosen = Diagnosing(**{"grid": GRID, "nulls": 8, **settings})
+    return prepare_case(clip_of(made, share=chosen.grid), chosen, memo_of(made), lambda *_: None)
+
+
+@cache
+def plain() -> Case:
+    """Of a recording in which nothing is planted."""
+    return case_of(recording())
+
+
+@cache
+def tilted() -> Case:
+    """Of one whose weight lies along x."""
+    return case_of(recording(values=TILT))

@@ -6,17 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from planted import GRID, recording
+from planted import plain
 
 from surgisim import diagnosis
-from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import words
 from surgisim.diagnosis.base import carried
 from surgisim.diagnosis.candidates import blocks, catalogue, costly
-from surgisim.diagnosis.clip import clip_of
-from surgisim.diagnosis.diagnose import prepare_case
 from surgisim.diagnosis.laws import described, law_of, steps
-from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.refine import turned
 from surgisim.physics.catalogue import catalogue as terms
 
@@ -37,9 +33,7 @@ SPOT = np.array([0.0, 0.0, 0.010])
 
 @pytest.fixture(scope="module")
 def case():
-    return prepare_case(
-        clip_of(recording(), share=GRID), Diagnosing(grid=GRID, nulls=4), Memo(None, ""), lambda *_: None
-    )
+    return plain()
 
 
 @pytest.fixture(scope="module")

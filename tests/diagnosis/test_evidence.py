@@ -44,14 +44,14 @@ def test_a_law_tried_in_many_places_pays_for_them(parts):
     residual = (0.6 * s + rng.standard_normal(400))[:, None]
     others = [found(rng.standard_normal(400), residual, "anywhere") for _ in range(50)]
     laws = by_law([found(s, residual), found(s, residual, "anywhere"), *others])
-    assert laws["here"][0] - laws["anywhere"][0] == pytest.approx(np.log(51), abs=0.05)
+    assert laws["here"].evidence - laws["anywhere"].evidence == pytest.approx(np.log(51), abs=0.05)
 
 
 def test_the_many_places_of_one_scope_do_not_dilute_another(parts):
     rng, s = parts
     residual = (0.6 * s + rng.standard_normal(400))[:, None]
     there = found(s, residual, "law")
-    alone = by_law([there])["law"][0]
+    alone = by_law([there])["law"].evidence
     blobs = [found(rng.standard_normal(400), residual, "law") for _ in range(50)]
     blobs = [replace(b, hypothesis=replace(b.hypothesis, scope="blob")) for b in blobs]
-    assert alone - by_law([there, *blobs])["law"][0] == pytest.approx(np.log(2), abs=0.05)
+    assert alone - by_law([there, *blobs])["law"].evidence == pytest.approx(np.log(2), abs=0.05)

@@ -5,13 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from planted import GRID, recording
+from planted import GRID, TILT, case_of, memo_of, recording
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration
+from surgisim.diagnosis import diagnose as diagnosing
 from surgisim.diagnosis.clip import clip_of
-from surgisim.diagnosis.diagnose import diagnose, hazy, prepare_case
-from surgisim.diagnosis.evidence import Finding
+from surgisim.diagnosis.diagnose import hazy
+from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import law_of, respond
 from surgisim.diagnosis.memo import Memo
@@ -23,11 +24,9 @@ FINE, WEIGHT = 0.18, np.array([8.0, 0.0, 0.0])
 
 
 @pytest.fixture(scope="module")
-def case(tmp_path_factory):
-    clip = clip_of(recording(values={"gravity": {"x": 8.0, "y": 0.0, "z": 0.0, "onset": -1.0}}), share=GRID)
+def case():
     # One folder for both grids: a run of the one must not pass for a run of the other.
-    memo = Memo(tmp_path_factory.mktemp("work"), "a recording")
-    return prepare_case(clip, Diagnosing(grid=GRID, replay=FINE, nulls=8), memo, lambda *_: None)
+    return case_of(recording(values=TILT), replay=FINE)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +40,7 @@ def named(case):
 
 def test_a_replay_is_the_engines_on_the_finer_grid(case, named):
     shown = replayed(case, named, named)
-    fine = clip_of(case.clip.recording, share=FINE)
+    fine = replace(clip_of(case.clip.recording, share=FINE), late=case.clip.late)
     law = law_of(named.refits[0].finding.hypothesis, WEIGHT, fine)
     assert shown.clip.body.spacing == fine.body.spacing < case.clip.body.spacing
     assert np.array_equal(shown.clip.rest, case.clip.rest)
@@ -57,26 +56,32 @@ def test_no_replay_on_a_grid_that_is_not_finer(case, named):
     assert replayed(replace(case, settings=Diagnosing(grid=GRID, replay=GRID)), named, None) is None
 
 
-def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_finer_grid(tmp_path, monkeypatch):
-    plain = Diagnosing(grid=GRID, replay=0.21, nulls=8, experiment=False, free=0, second=False)
-    made, said = recording(), []
+def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_finer_grid(monkeypatch):
+    settings = Diagnosing(grid=GRID, replay=0.21, nulls=8, experiment=False, free=0, second=False, refine=1)
+    first_look, looked, said, made = diagnosing.first_look, [], [], recording()
 
-    def spacing(**settings):
-        chosen = plain.model_copy(update=settings)
-        found, *_ = diagnose(made, chosen, lambda share, _, text: said.append((share, text)), Memo(tmp_path, ""))
-        return 1e-3 * found.global_test["spacing"]["value"]
+    def look(recording, chosen, memo, progress):
+        looked.append((chosen.grid, memo.about))
+        progress(0.1, 1, "noise")
+        progress(0.5, 1, "trying")
+        # What a finer grid would show is not looked at here: the coarse one stands for it.
+        return first_look(recording, settings, memo_of(made), lambda *_: None)
 
-    coarse, fine = (clip_of(made, share=share).body.spacing for share in (GRID, 0.21))
     monkeypatch.setattr(calibration, "STRAINED", 0.0)
-    # A replay's grid that is no finer is none to look at again.
-    assert spacing(replay=GRID) == pytest.approx(coarse)
-    said.clear()
-    assert spacing() == pytest.approx(fine)
+    monkeypatch.setattr(diagnosing, "first_look", look)
+    diagnosing.diagnose(made, settings, lambda share, _, text: said.append((share, text)), memo_of(made))
+    (coarse, about), (fine, about_finer) = looked
+    assert (coarse, fine) == (GRID, 0.21)
+    assert about != about_finer
     shares = [share for share, _ in said]
     assert shares == sorted(shares)
-    assert sum(text.endswith("on a finer grid") for _, text in said) > 10
+    assert [text for _, text in said[2:4]] == ["noise, on a finer grid", "trying, on a finer grid"]
 
 
 @pytest.mark.parametrize(("evidence", "strained", "wanted"), [(49, True, True), (51, True, False), (49, False, False)])
 def test_a_law_that_is_clear_needs_no_finer_grid(evidence, strained, wanted):
-    assert hazy(SimpleNamespace(strained=strained), {"gravity": (evidence,), "tether": (3.0,)}) == wanted
+    laws = {"gravity": evidence, "tether": 3.0}
+    assert (
+        hazy(SimpleNamespace(strained=strained), {term: Score(e, np.zeros(1), []) for term, e in laws.items()})
+        == wanted
+    )

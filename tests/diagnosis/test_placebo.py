@@ -4,14 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import GRID, recording
+from planted import tilted
 
-from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis.clip import clip_of
-from surgisim.diagnosis.diagnose import prepare_case
-from surgisim.diagnosis.evidence import Finding
+from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.placebo import held, placebo, wrong
 from surgisim.diagnosis.refit import Refit
 from surgisim.diagnosis.together import Together
@@ -22,14 +18,17 @@ MOVED = np.array([0.0, 0.01, 0.3])
 
 @pytest.fixture(scope="module")
 def case():
-    clip = clip_of(recording(values={"gravity": {"x": 8.0, "y": 0.0, "z": 0.0, "onset": -1.0}}), share=GRID)
-    return prepare_case(clip, Diagnosing(grid=GRID, nulls=8), Memo(None, ""), lambda *_: None)
+    return tilted()
 
 
 def finding(term: str, amplitude, *, at=None, evidence=20.0, size=1e-4, **about) -> Finding:
     a = np.atleast_1d(np.array(amplitude, float))
     h = Hypothesis(term, np.eye(len(a)), 1, None if at is None else Place(at, 0.004), 0.0, None, about)
     return Finding(h, evidence, a, 0.1 * np.abs(a), 40.0, np.zeros(1), 0, size)
+
+
+def score(evidence: float, *findings: Finding) -> Score:
+    return Score(evidence, np.zeros(1), list(findings))
 
 
 def named(case, one: Finding) -> Together:
@@ -41,7 +40,7 @@ def test_it_has_the_body_of_what_is_named(case):
     weight = finding("gravity", [8.0, 0.0, 0.0])
     strand = finding("fibre", 4e3, k2=0.5, axis=np.array([0.0, 1.0, 0.0]))
     told = named(case, weight)
-    laws = {"gravity": (50.0, None, [weight]), "fibre": (20.0, None, [strand])}
+    laws = {"gravity": score(50.0, weight), "fibre": score(20.0, strand)}
     given = placebo(case, told, told.refits, laws)
     body = held(case, told.x)
     assert given.refits[0].term == "fibre"
@@ -58,12 +57,12 @@ def test_the_same_law_far_away_goes_before_another_law(case):
     here, near, far = (finding("stiff_inclusion", 0.5, at=(x, 0.0, 0.0)) for x in (0.0, 0.006, 0.02))
     told = named(case, here)
     other = finding("gravity", [1.0, 0.0, 0.0], evidence=99.0)
-    laws = {"stiff_inclusion": (50.0, None, [here, near, far]), "gravity": (20.0, None, [other])}
+    laws = {"stiff_inclusion": score(50.0, here, near, far), "gravity": score(20.0, other)}
     assert wrong(told, told.refits, laws) == [far]
-    assert wrong(told, told.refits, {**laws, "stiff_inclusion": (50.0, None, [here, near])}) == [other]
+    assert wrong(told, told.refits, {**laws, "stiff_inclusion": score(50.0, here, near)}) == [other]
 
 
 def test_without_a_law_that_acts_there_is_none(case):
     told = named(case, finding("gravity", [8.0, 0.0, 0.0]))
     still = replace(finding("fibre", 0.0, k2=0.5, axis=np.array([0.0, 1.0, 0.0])), size=0.0)
-    assert placebo(case, told, told.refits, {"fibre": (20.0, None, [still])}) is None
+    assert placebo(case, told, told.refits, {"fibre": score(20.0, still)}) is None

@@ -2,17 +2,12 @@
 
 import numpy as np
 import pytest
-from planted import GRID, recording
+from planted import case_of, recording
 
-from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis import calibration, verdict
-from surgisim.diagnosis.clip import clip_of
-from surgisim.diagnosis.diagnose import prepare_case
-from surgisim.diagnosis.errors import rms
+from surgisim.diagnosis import calibration, judgement
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import joined, law_of, respond
-from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.refit import Refit
 from surgisim.diagnosis.together import Together, needed, prediction, together
 
@@ -25,8 +20,7 @@ def case():
         "gravity": {"x": 6.0, "y": 0.0, "z": 0.0, "onset": -1.0},
         "fibre": {"k1": 4e3, "k2": 0.5, "yaw": 0.0, "pitch": np.pi / 2},
     }
-    clip = clip_of(recording(values=planted), share=GRID)
-    return prepare_case(clip, Diagnosing(grid=GRID, nulls=8), Memo(None, ""), lambda *_: None)
+    return case_of(recording(values=planted))
 
 
 def found(case, h: Hypothesis, amplitude: np.ndarray) -> Refit:
@@ -44,7 +38,7 @@ def test_laws_that_are_fitted_together_do_not_make_up_for_each_other(case):
     said = []
     apart = together(case, [weight, strand], said.append, free=False)
     both = together(case, [weight, strand], said.append, free=True)
-    assert rms(case, both.moved)[0] < rms(case, apart.moved)[0]
+    assert both.gain > apart.gain
     assert both.refits[0].amplitude == pytest.approx(WEIGHT, abs=1.5)
     assert abs(both.refits[1].finding.hypothesis.about["axis"] @ AXIS) > np.cos(0.5 * TURN)
     assert len(both.refits[0].draws) == len(both.refits[1].draws) > 0
@@ -69,7 +63,7 @@ def test_a_law_that_came_out_as_nothing_is_dropped_and_one_that_says_something_i
     assert case.base.simulated + kept.refits[0].response == pytest.approx(kept.moved)
     both = fitted(strand, weight)
     # So little of the strands shows in a pull that hardly runs along them: they stay or go with what is asked.
-    assert 0.5 * (both.gain - fitted(weight).gain) == pytest.approx(9.3, abs=3.0)
+    assert 3.0 < 0.5 * (both.gain - fitted(weight).gain) < 25.0
     monkeypatch.setattr(calibration, "THRESHOLD", 3.0)
     assert needed(case, both) is both
     monkeypatch.setattr(calibration, "THRESHOLD", 25.0)
@@ -81,6 +75,6 @@ def test_a_law_that_came_out_as_nothing_is_dropped_and_one_that_says_something_i
 )
 def test_a_second_law_is_named_for_what_both_explain_together(monkeypatch, gain, left, said):
     one, both = (Together([], np.array(x), g, np.zeros(3)) for x, g in ((0.4, 200.0), (left, gain)))
-    monkeypatch.setattr(verdict, "still", lambda case, bend, moved: float(moved))
+    monkeypatch.setattr(judgement, "still", lambda case, bend, moved: float(moved))
     # Half of what is left has to go, and half the gain must exceed 25 + 3 % of 200.
-    assert verdict.pays(None, None, one, both) is said
+    assert judgement.pays(None, None, one, both) is said

@@ -17,7 +17,7 @@ BODY = recording()
 def made_up_case(kept: np.ndarray) -> SimpleNamespace:
     """As much of a case as drawing needs: every point at rest in the base."""
     rest = BODY.attached()[kept]
-    noise = Noise(np.full(len(kept), 3e-4), 0.2, 0.006, 0.02, 0.02, 0.7, 0.3, 0.75, 0.45)
+    noise = Noise(np.full(len(kept), 3e-4), 0.2, 0.006, 0.02, 0.02, 0.7, 0.5, 0.3, 0.75, 0.45)
     clip = SimpleNamespace(rest=rest, frames=BODY.frames)
     return SimpleNamespace(
         clip=clip, noise=noise, base=SimpleNamespace(simulated=np.zeros((len(kept), BODY.frames, 3)))

@@ -1,0 +1,83 @@
+"""Frames held out refute, confirm, or cannot show; what they refute gives way to the next law that they confirm."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from surgisim.diagnosis import judgement
+from surgisim.diagnosis.calibration import CLEAR, PULLS, PUSH_LEAVES, THRESHOLD
+from surgisim.diagnosis.evidence import Finding
+from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.judgement import Explanation, stands
+from surgisim.diagnosis.prospect import Gain
+from surgisim.diagnosis.refit import Refit
+from surgisim.diagnosis.together import Together
+from surgisim.physics.place import Place
+
+BETTER, WORSE, ALIKE, BLIND = (
+    Gain(60.0, 30.0, 90.0, 70.0), Gain(-60.0, -90.0, -30.0, 70.0), Gain(5.0, -20.0, 30.0, 70.0), Gain(0.1, -1, 1, 2.0)
+)  # fmt: skip
+CASE, UNCALIBRATED = (
+    SimpleNamespace(settings=SimpleNamespace(calibrated=known), strained=False) for known in (True, False)
+)
+
+
+def explanation(term="gravity", evidence=90.0, ahead=BETTER, left=0.05, out=None) -> Explanation:
+    place = Place((0.0, 0.0, 0.0), 0.003) if term == "hidden_contact" else None
+    finding = Finding(
+        Hypothesis(term, np.eye(3), 0, place), evidence, np.ones(3), np.ones(3), 100.0, np.zeros(1), 0, 1e-4
+    )
+    one = Refit(finding, np.ones(3), np.zeros((1, 1, 3)), 100.0, evidence)
+    return Explanation(Together([one], np.zeros((1, 1, 3)), 100.0, np.zeros(3)), evidence, ahead, left, out)
+
+
+def reason(chosen: Explanation, explained=0.9, took=0.9, over=None, case=CASE) -> str:
+    return judgement._reason(case, chosen, explained, took, over)
+
+
+def test_what_frames_held_out_refute_gives_way_to_the_next_that_they_confirm():
+    refuted, blind, confirmed = (explanation(ahead=ahead) for ahead in (WORSE, BLIND, BETTER))
+    assert stands([refuted, blind, confirmed]) is confirmed
+    assert stands([refuted, blind]) is refuted
+    assert stands([blind, confirmed]) is blind
+    weak = explanation(evidence=THRESHOLD - 1)
+    assert stands([refuted, weak]) is refuted
+
+
+def test_what_they_gain_or_lose_counts_among_the_evidence():
+    assert explanation(ahead=BETTER).support == 90.0 + 30.0
+    assert explanation(ahead=WORSE).support == 90.0 - 30.0
+    assert explanation(ahead=None).support == 90.0
+
+
+@pytest.mark.parametrize(
+    ("chosen", "said"),
+    [
+        (explanation(), "named"),
+        (explanation(ahead=WORSE), "refuted"),
+        (explanation(ahead=ALIKE), "unconfirmed"),
+        (explanation(ahead=BLIND), "named"),
+        (explanation(ahead=BLIND, evidence=CLEAR - 1), "unconfirmed"),
+        (explanation(ahead=None), "named"),
+        (explanation(ahead=None, evidence=CLEAR - 1), "unconfirmed"),
+        (explanation(evidence=THRESHOLD - 1), "little"),
+        (explanation("hidden_contact", left=PUSH_LEAVES + 0.1, out=-0.8), "loose"),
+        (explanation("hidden_contact", out=PULLS + 0.1), "drawn"),
+        (explanation("hidden_contact", out=-0.8), "named"),
+    ],
+)
+def test_a_law_is_named_for_a_reason(chosen, said):
+    assert reason(chosen) == said
+
+
+def test_a_law_is_not_named_for_little():
+    assert reason(explanation(), explained=0.5) == "little"
+    assert reason(explanation(evidence=CLEAR - 1), took=0.1) == "faint"
+    assert reason(explanation(evidence=CLEAR + 1), took=0.1) == "named"
+    assert reason(explanation(evidence=CLEAR - 1), took=0.1, case=UNCALIBRATED) == "named"
+
+
+def test_a_tie_with_a_placebo_is_no_defeat():
+    assert [reason(explanation(), over=over) for over in (None, BETTER, ALIKE, BLIND)] == ["named"] * 4
+    assert reason(explanation(), over=WORSE) == "beaten"

@@ -1,0 +1,111 @@
+"""What a recording leaves open explains itself; noise and nuisances drawn from the model fit it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import plain
+from scipy.stats import chi2
+
+from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis.diagnose import whitened
+from surgisim.diagnosis.left_open import drifted, nuisances, told
+from surgisim.diagnosis.metric import metric
+from surgisim.diagnosis.noise import whitener
+from surgisim.diagnosis.nuisance import chosen
+from surgisim.diagnosis.self_consistency import drawn
+
+NAMES = (
+    "release", "held", "lag", "scale", "drift", "simulator", "grip radius", "grip centre", "grip firmness", "grip path",
+    "elastic law",
+)  # fmt: skip
+DIRECTIONS, DRAWS = 300, 12
+
+
+@pytest.fixture(scope="module")
+def case():
+    return plain()
+
+
+@pytest.fixture(scope="module")
+def gappy(case):
+    """Whitening and metric where a fifth of the samples are missing."""
+    clip, rng = case.clip, np.random.default_rng(11)
+    seen = rng.random((len(clip.rest), clip.until)) > 0.2
+    whiten = whitener(case.noise, clip.rest, seen)
+    return whiten, metric(whitened(whiten, case.groups, clip.until)), seen
+
+
+def residuals(case, whiten, seen) -> np.ndarray:
+    """Whitened draws of noise and of nuisances at random prior values, (N, DRAWS)."""
+    rng, until, result = np.random.default_rng(12), case.clip.until, []
+    for _ in range(DRAWS):
+        field = case.noise.draw(case.clip.rest, until, rng)
+        for group in case.groups:
+            field = field + np.tensordot(rng.standard_normal(len(group.columns)), group.columns[:, :, :until], (0, 0))
+        result.append(whiten(np.where(seen[..., None], field, 0.0)))
+    return np.stack(result, 1)
+
+
+def test_what_is_drawn_from_the_model_fits_it_where_a_fifth_is_missing(case, gappy):
+    whiten, space, seen = gappy
+    z = residuals(case, whiten, seen)
+    per_degree = np.diag(space.gram(z, z)) / whiten.free
+    assert per_degree == pytest.approx(np.ones(DRAWS), abs=0.1)
+    assert per_degree.mean() == pytest.approx(1.0, abs=0.03)
+
+
+def test_slow_smooth_directions_gain_on_it_what_chance_gives(case, gappy):
+    whiten, space, seen = gappy
+    clip, rng = case.clip, np.random.default_rng(13)
+    time, fields = np.arange(clip.until) / clip.until, []
+    for _ in range(DIRECTIONS):
+        bump = np.exp(-0.5 * ((clip.rest - rng.choice(clip.rest)) ** 2).sum(1) / rng.uniform(0.004, 0.02) ** 2)
+        course = np.sin(2 * np.pi * (rng.uniform(0.3, 2) * time + rng.uniform()))
+        fields.append(bump[:, None, None] * course[None, :, None] * rng.standard_normal(3))
+    columns = whiten(np.stack(fields)).T
+    gains = space.gram(columns, residuals(case, whiten, seen)) ** 2 / np.diag(space.gram(columns, columns))[:, None]
+    assert gains.mean() == pytest.approx(1.0, abs=0.2)
+    assert gains.max() < chi2.isf(1e-2 / DIRECTIONS / DRAWS, 1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_nuisance_at_one_standard_deviation_is_explained_by_its_own_kind_alone(case, name):
+    until = case.clip.until
+    mine = [g for g in case.groups if g.name == name]
+    assert len(mine) == 1
+    others = chosen(case.groups, Diagnosing(without=[name]))
+    assert len(others) == len(case.groups) - 1
+    columns = whitened(case.whiten, mine, until)
+    slopes = case.whiten(case.base.slopes).T
+    without = metric(np.concatenate([whitened(case.whiten, others, until), slopes], 1))
+    beside, left = (np.diag(space.gram(columns, columns)) for space in (without, case.space))
+    # One direction of unit variance leaves b / (1 + b) of a chi square of b: below 1, however large the nuisance is.
+    assert (left <= 1.01 * beside / (1 + beside)).all()
+
+
+def test_a_camera_that_drifts_is_said(case):
+    assert not any("camera drifts" in said for said in told(case))
+    until = case.clip.until
+    drift = next(g for g in case.groups if g.name == "drift")
+    field = 8.0 * drift.columns[0]
+    pushed = replace(case, z=case.z + case.whiten(field[:, :until]))
+    size = np.sqrt((field[:, until - 1] ** 2).sum(1).mean())
+    assert drifted(pushed) == pytest.approx(size, rel=0.35)
+    assert any(said.startswith("Not tissue: the camera drifts by ") for said in told(pushed))
+    row = next(r for r in nuisances(pushed) if r["name"] == "camera drift by the end")
+    assert row["value"] == drifted(pushed)
+
+
+def test_what_a_case_draws_is_like_its_recording(case):
+    until, rng = case.clip.until, np.random.default_rng(3)
+    fitted, ahead = [], []
+    freedom = [case.whiten.free, case.prospect.whiten_all.free - case.whiten.free]
+    for _ in range(DRAWS):
+        moved = drawn(case, rng)
+        assert moved.shape == case.clip.moved.shape
+        z = case.whiten((moved - case.base.simulated)[:, :until])[:, None]
+        fitted.append(case.space.gram(z, z)[0, 0] / freedom[0])
+        ahead.append(case.prospect.misfit(moved - case.base.simulated).sum() / freedom[1])
+    assert np.mean(fitted) == pytest.approx(1.0, abs=0.05)
+    assert np.mean(ahead) == pytest.approx(1.0, abs=0.1)
