@@ -131,7 +131,7 @@ def judged(
     explained = float(np.clip(fitted.gain / total, 0, 1))
     noise = noise_beside(case, fitted.moved)
     took = taken(case, fitted.moved, noise.sigma)
-    reason = _reason(case, chosen, explained, took, over)
+    reason = _reason(case, chosen, chances[term], explained, took, over)
     if worse and reason == "named":
         reason = "refuted"
     if reason == "faint":
@@ -180,8 +180,9 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
     return chosen
 
 
-def _reason(case: Case, chosen: Explanation, explained: float, took: float, over: Gain | None) -> str:
-    evidence = chosen.log_evidence
+def _reason(case: Case, chosen: Explanation, chance: float, explained: float, took: float, over: Gain | None) -> str:
+    """Why it is named, or not; chance: its probability among all laws."""
+    evidence = chosen.log_evidence if case.settings.calibrated else np.inf
     if case.settings.calibrated and not case.strained and evidence < calibration.CLEAR and took < calibration.TAKEN:
         return "faint"
     if chosen.loose:
@@ -194,7 +195,8 @@ def _reason(case: Case, chosen: Explanation, explained: float, took: float, over
         return "little"
     if chosen.visible and not chosen.confirmed:
         return "unconfirmed"
-    if not chosen.visible and evidence < calibration.CLEAR:
+    if not chosen.visible and evidence < calibration.CLEAR and chance < calibration.SURE:
+        # The fitted frames alone speak, and not for it alone.
         return "unconfirmed"
     if over is not None and over.refuted:
         return "beaten"

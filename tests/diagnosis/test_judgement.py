@@ -32,8 +32,8 @@ def explanation(term="gravity", evidence=90.0, ahead=BETTER, left=0.05, out=None
     return Explanation(Together([one], np.zeros((1, 1, 3)), 100.0, np.zeros(3)), evidence, ahead, left, out)
 
 
-def reason(chosen: Explanation, explained=0.9, took=0.9, over=None, case=CASE) -> str:
-    return judgement._reason(case, chosen, explained, took, over)
+def reason(chosen: Explanation, chance=0.9, explained=0.9, took=0.9, over=None, case=CASE) -> str:
+    return judgement._reason(case, chosen, chance, explained, took, over)
 
 
 def test_what_frames_held_out_refute_gives_way_to_the_next_that_they_confirm():
@@ -58,9 +58,7 @@ def test_what_they_gain_or_lose_counts_among_the_evidence():
         (explanation(ahead=WORSE), "refuted"),
         (explanation(ahead=ALIKE), "unconfirmed"),
         (explanation(ahead=BLIND), "named"),
-        (explanation(ahead=BLIND, evidence=CLEAR - 1), "unconfirmed"),
         (explanation(ahead=None), "named"),
-        (explanation(ahead=None, evidence=CLEAR - 1), "unconfirmed"),
         (explanation(evidence=THRESHOLD - 1), "little"),
         (explanation("hidden_contact", left=PUSH_LEAVES + 0.1, out=-0.8), "loose"),
         (explanation("hidden_contact", out=PULLS + 0.1), "drawn"),
@@ -69,6 +67,34 @@ def test_what_they_gain_or_lose_counts_among_the_evidence():
 )
 def test_a_law_is_named_for_a_reason(chosen, said):
     assert reason(chosen) == said
+
+
+@pytest.mark.parametrize("ahead", [BLIND, None])
+def test_what_nothing_confirms_and_the_fitted_frames_do_not_settle_is_supported_only(ahead):
+    faint = explanation(ahead=ahead, evidence=CLEAR - 1)
+    assert reason(faint, chance=0.4) == "unconfirmed"
+    assert reason(faint, chance=0.9) == "named"
+    assert reason(explanation(ahead=ahead, evidence=CLEAR + 1), chance=0.4) == "named"
+
+
+def two(more: int, chance: float, cos: float) -> tuple[Explanation, list[Explanation], dict[str, float]]:
+    freer = explanation("hidden_contact")
+    h = freer.first.finding.hypothesis
+    same = Hypothesis("added_mass", np.eye(3)[:, :more], 1, h.place)
+    finding = Finding(same, 90.0, np.ones(more), np.ones(more), 100.0, np.zeros(1), 0, 1e-4)
+    one = Refit(finding, np.ones(more), np.zeros((1, 1, 3)), 100.0, 90.0)
+    fewer = Explanation(Together([one], np.zeros((1, 1, 3)), 100.0, np.zeros(3)), 90.0, BETTER, 0.05, None)
+    return freer, [freer, fewer], {"hidden_contact": 1 - chance, "added_mass": chance}
+
+
+CASES = [(1, 0.35, 0.95, True), (1, 0.1, 0.95, False), (1, 0.35, 0.5, False), (3, 0.35, 0.95, False)]
+
+
+@pytest.mark.parametrize(("more", "chance", "cos", "simpler"), CASES)
+def test_of_two_laws_that_do_the_same_the_simpler_comes_first(monkeypatch, more, chance, cos, simpler):
+    monkeypatch.setattr(judgement, "cos", lambda *_: cos)
+    freer, tried, chances = two(more, chance, cos)
+    assert judgement.simplest(CASE, freer, tried, chances) is tried[int(simpler)]
 
 
 def test_a_law_is_not_named_for_little():
