@@ -53,7 +53,7 @@ class Case:
         return flexible(self.clip, self.whiten, self.space, self.nulls)
 
     @cached_property
-    def strain(self) -> float:
+    def nuisance_ratio(self) -> float:
         """Squares of the nuisances at their most likely values, over what all but 5 % of the nulls stay below [1]."""
         own, nulls = (self.space.likely(v) for v in (self.z, self.nulls))
         return float((own**2).sum() / np.quantile((nulls**2).sum(0), 0.95))
@@ -64,9 +64,9 @@ class Case:
         return prospect(self)
 
     @property
-    def strained(self) -> bool:
+    def overstretched(self) -> bool:
         """Whether camera, grips, base and the simulator's own error would have to be larger than they ever are."""
-        return self.settings.calibrated and self.strain > calibration.STRAINED
+        return self.settings.calibrated and self.nuisance_ratio > calibration.OVERSTRETCHED
 
     @property
     def workers(self) -> int:

@@ -51,7 +51,7 @@ def diagnose(
     clip, settings, memo = case.clip, case.settings, case.memo
     laws = by_law(findings)
     bend = case.flexible.fit(case.z)
-    detected = case.strained or max(score.evidence for score in laws.values()) > threshold(laws, settings)
+    detected = case.overstretched or max(score.evidence for score in laws.values()) > threshold(laws, settings)
     if detected:
         parts = costly(clip, case.base, memo, case.workers)
         findings += search(case, case.z, case.nulls, lambda s, text: progress(0.64, 1, text), parts)
@@ -109,7 +109,7 @@ def hazy(case: Case, laws: Scores) -> bool:
     What is hidden close to a grip, where tissue tears, is steeper than a coarse grid can show: there nothing fits well,
     and how firmly the grip carries makes up for it.
     """
-    return case.strained and max(score.evidence for score in laws.values()) < calibration.CLEAR
+    return case.overstretched and max(score.evidence for score in laws.values()) < calibration.CLEAR
 
 
 def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress) -> Case:

@@ -183,7 +183,12 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
 def _reason(case: Case, chosen: Explanation, chance: float, explained: float, took: float, over: Gain | None) -> str:
     """Why it is named, or not; chance: its probability among all laws."""
     evidence = chosen.log_evidence if case.settings.calibrated else np.inf
-    if case.settings.calibrated and not case.strained and evidence < calibration.CLEAR and took < calibration.TAKEN:
+    if (
+        case.settings.calibrated
+        and not case.overstretched
+        and evidence < calibration.CLEAR
+        and took < calibration.TAKEN
+    ):
         return "faint"
     if chosen.loose:
         return "loose"

@@ -102,7 +102,7 @@ def write(
             "log_evidence": float(laws[ranked[0]].evidence),
             "nulls": np.round(highest(laws), 3).tolist(),
             "explainable": float(explainable(bend)),
-            "nuisance_ratio": case.strain,
+            "nuisance_ratio": case.nuisance_ratio,
             **_shares(said_of),
             "spacing": {"value": float(1e3 * shown.clip.body.spacing), "unit": "mm"},
             "beside": None if fitted is None or fitted.beside is None else _beside(case, bend, fitted.beside),

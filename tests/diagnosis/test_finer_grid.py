@@ -67,7 +67,7 @@ def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_fi
         # What a finer grid would show is not looked at here: the coarse one stands for it.
         return first_look(recording, settings, memo_of(made), lambda *_: None)
 
-    monkeypatch.setattr(calibration, "STRAINED", 0.0)
+    monkeypatch.setattr(calibration, "OVERSTRETCHED", 0.0)
     monkeypatch.setattr(diagnosing, "first_look", look)
     diagnosing.diagnose(made, settings, lambda share, _, text: said.append((share, text)), memo_of(made))
     (coarse, about), (fine, about_finer) = looked
@@ -82,6 +82,6 @@ def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_fi
 def test_a_law_that_is_clear_needs_no_finer_grid(evidence, strained, wanted):
     laws = {"gravity": evidence, "tether": 3.0}
     assert (
-        hazy(SimpleNamespace(strained=strained), {term: Score(e, np.zeros(1), []) for term, e in laws.items()})
+        hazy(SimpleNamespace(overstretched=strained), {term: Score(e, np.zeros(1), []) for term, e in laws.items()})
         == wanted
     )

@@ -19,7 +19,7 @@ BETTER, WORSE, ALIKE, BLIND = (
     Gain(60.0, 30.0, 90.0, 70.0), Gain(-60.0, -90.0, -30.0, 70.0), Gain(5.0, -20.0, 30.0, 70.0), Gain(0.1, -1, 1, 2.0)
 )  # fmt: skip
 CASE, UNCALIBRATED = (
-    SimpleNamespace(settings=SimpleNamespace(calibrated=known), strained=False) for known in (True, False)
+    SimpleNamespace(settings=SimpleNamespace(calibrated=known), overstretched=False) for known in (True, False)
 )
 
 

@@ -79,14 +79,14 @@ def test_nuisances_larger_than_they_ever_are_are_something_hidden(bare, monkeypa
     found, *_ = bare
     assert found.global_test["nuisance_ratio"] < 1.0
     case = plain()
-    assert case.strain == pytest.approx(found.global_test["nuisance_ratio"], rel=1e-3)
+    assert case.nuisance_ratio == pytest.approx(found.global_test["nuisance_ratio"], rel=1e-3)
     columns = case.space.columns
     for size, strained in ((1.0, False), (3.0, True)):
         values = size * np.random.default_rng(0).standard_normal(columns.shape[1])
         pushed = replace(case, z=case.z + columns @ values)
-        assert pushed.strained == strained
-        assert not replace(pushed, settings=SETTINGS.model_copy(update={"calibrated": False})).strained
-    monkeypatch.setattr(calibration, "STRAINED", 0.0)
+        assert pushed.overstretched == strained
+        assert not replace(pushed, settings=SETTINGS.model_copy(update={"calibrated": False})).overstretched
+    monkeypatch.setattr(calibration, "OVERSTRETCHED", 0.0)
     said, physics, _ = verdict(SETTINGS.model_copy(update={"replay": GRID, "refine": 1, "second": False}))
     assert (said.verdict, set(physics.terms)) == ("unexplained", {"neo_hookean_ciarlet", "newtonian"})
     assert said.unexplained_fraction > 0.8

@@ -171,7 +171,11 @@ def inventing(w):
 
 def diagnosing(w):
     """Params function: the config's settings of a diagnosis, with what this way or this known recording changes."""
-    changes = WAYS[w.way] if hasattr(w, "way") else KNOWN[w.known].settings
+    return with_changes(WAYS[w.way] if hasattr(w, "way") else KNOWN[w.known].settings)
+
+
+def with_changes(changes):
+    """The config's settings of a diagnosis with others laid over them, as JSON."""
     told = {**PLAN.choices.diagnosis.model_dump(), **changes}
     return json.dumps(checked(Diagnosing, told, "diagnosis").model_dump(mode="json"))
 

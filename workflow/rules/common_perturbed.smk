@@ -76,11 +76,12 @@ def noise_free(w):
     return f"{w.home}/sealed/truth.npz" if w.home.startswith("robustness/") else []
 
 
-def diagnosing(w):
+def diagnosing_perturbed(w):
     """Params function: as ever, or otherwise where that is what is tried."""
     own = KNOWN.get(w.home.removeprefix("metamorphic/"))
-    chosen = {**config.get("diagnosis", {}), **(own.settings if own else {})}
-    return json.dumps({**chosen, **OTHER_SETTINGS.get(w.perturbation, {})})
+    return with_changes(
+        {**(own.settings if own else {}), **OTHER_SETTINGS.get(w.perturbation, {})}
+    )
 
 
 def earlier(room):

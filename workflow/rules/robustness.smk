@@ -109,7 +109,7 @@ rule perturbed_diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=diagnosing,
+        settings=diagnosing_perturbed,
         code=code("diagnosis"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
@@ -142,7 +142,7 @@ rule robustness:
     resources:
         mem_mb=1000,
     params:
-        folder=f"robustness/{SEED}",
+        folder=lambda w, output: Path(output.table).parent,
         before=earlier(f"robustness/{SEED}"),
         settings=lambda w: json.dumps(
             {"bodies": chosen_bodies(), "perturbations": OF_BODIES}

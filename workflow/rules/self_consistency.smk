@@ -29,7 +29,7 @@ rule draws:
             {
                 "count": DRAWS,
                 "seed": SEED,
-                "diagnosis": {**config.get("diagnosis", {}), **OF_NULLS},
+                "diagnosis": json.loads(with_changes(OF_NULLS)),
             }
         ),
         code=code("draws"),
@@ -88,7 +88,7 @@ rule drawn_diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=json.dumps({**config.get("diagnosis", {}), **OF_NULLS}),
+        settings=with_changes(OF_NULLS),
         code=code("diagnosis"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
