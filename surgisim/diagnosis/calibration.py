@@ -1,14 +1,14 @@
 """Numbers of a verdict, and from what each was learned.
 
-Those that name seeds were read off calibration recordings of the blind generator, cases that conceal nothing, one effect
-or an effect outside the catalogue, none of which is ever reported as a result; docs/diagnosis.md tells how. They are one
-generator's numbers. What a nuisance may be is none of them (nuisance.py).
+Those that name seeds were read off calibration recordings of the blind generator, cases that conceal nothing, one
+effect or an effect outside the catalogue, none of which is ever reported as a result; docs/diagnosis.md tells how. They
+are one generator's numbers. What a nuisance may be is none of them (nuisance.py).
 """
 
 THRESHOLD = 25.0
 """log evidence of the best law below which nothing is called detectable. Four empty bodies of seed 907001, as they are
-and as somebody else might have recorded them (44 runs: releases, planes, drift, jitter, missing samples, half the frames
-or points, other viscosity), reach -1 to 33, half of them less than 9, and 51 and 132 in two that are alarms."""
+and as somebody else might have recorded them (47 runs: releases, planes, drift, jitter, missing samples, half the
+frames or points, other viscosity), reach -1 to 33, half of them less than 10, and 51 and 132 in two that are alarms."""
 CLEAR = 50.0
 """log evidence beyond which something is hidden for certain, of the same runs."""
 TAKEN = 0.15
@@ -16,8 +16,8 @@ TAKEN = 0.15
 where nothing is hidden and evidence passes the threshold all the same, the best law takes 0 to .06 (seed 907)."""
 OVERSTRETCHED = 1.5
 """Squares of the nuisances at their most likely values, over what nulls stay below, beyond which something is hidden
-however little any law's signature says of it: in those runs .34 to .96 where nothing is, 2.1 and 6.1 in two bodies with a
-law."""
+however little any law's signature says of it: in those runs .34 to .96 where nothing is, 2.1 and 6.1 in two bodies with
+a law."""
 TEMPERATURE = 8.0
 """By which differences of log evidence are divided before they become probabilities: signatures are not exact."""
 MISFIT = 0.05
