@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from surgisim.diagnosis import calibration
 from surgisim.diagnosis.clip import OPENS, Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
@@ -65,9 +66,6 @@ ROUNDS, AGAIN = 3, 25.0
 NEWTONS, SETTLED = 2, 0.1
 """Steps at most by which grips, held tissue and elastic law, once they are known, move the base, and what counts as
 none, in prior standard deviations."""
-SOLVERS = 0.012
-"""By how much Poisson's ratio differs between solvers that give the same displacements: how a mesh or grid lets tissue
-change its volume is its own. (Engine less the phantom's elements: +.003, -.007 and -.026 on three empty bodies.)"""
 AFTER = 0.5
 """How long a short run goes on after the release [s]."""
 
@@ -191,9 +189,9 @@ def settled(clip: Clip, whiten: Whitener, space: Metric, slopes: slice, base: Ba
         near = tangent(base.prepared, values_of(found.x), found.drive, found.run, clip.rest, until)
         found = replace(found, tangent=near)
     open_to = np.linalg.inv(np.eye(space.columns.shape[1]) + (space.columns.T @ space.columns).astype(float))
-    worse = max(1.0, least / max(whiten.free, 1))
-    spread = np.sqrt(worse * np.diag(open_to)[slopes]) * SPREAD
-    return replace(found, spread=np.hypot(spread, [0.0, SOLVERS, 0.0]))
+    # As uncertain as a verdict takes evidence to be: what grid and mesh still have wrong is alike in many samples.
+    told = (1 / np.diag(open_to)[slopes] - 1) / calibration.TEMPERATURE
+    return replace(found, spread=SPREAD / np.sqrt(1 + told))
 
 
 def set_to(clip: Clip, y: np.ndarray, releases: list[tuple[int, int]]) -> Clip:
