@@ -48,7 +48,7 @@ MOMENTS = (0.0, 0.5, 1.0)
 """Where a descent may start, in logarithms of E and of eta / E away from START, and moments of release [frames]: a
 ring-down misfits by whole periods, one that is faster than the frames looks like a slower one, and a soft body let go
 early looks like a stiff one let go late."""
-DESCENTS_FROM = 4
+DESCENTS_FROM = 3
 """Of those, from how many a descent starts."""
 STIFFER = np.log(3.0)
 """Step of log E where the body to begin with is torn apart."""
@@ -63,6 +63,9 @@ ALIKE = 2.0
 the softest takes the longest steps."""
 ROUNDS, AGAIN = 3, 25.0
 """Fits at most, and what chi square a run may cost beyond what the last one promised; chosen: 3 where it went well."""
+ASIDE = 0.05
+"""Share of what a base leaves unexplained, noise aside, below which nothing about it is worth another step: where
+something is hidden no base fits, and its numbers are fitted again with every law."""
 NEWTONS, SETTLED = 2, 0.1
 """Steps at most by which grips, held tissue and elastic law, once they are known, move the base, and what counts as
 none, in prior standard deviations."""
@@ -144,8 +147,10 @@ def fit_base(
             clip, whiten, space, memo, bodies, carry, y.copy(), run, simulated[:, : clip.until],
             _by_poisson(prepared, near, y[:3]), releases,
         )  # fmt: skip
-        if n > 0 and (n == rounds or around.cost(y, around.left(y)) < promised + AGAIN):
-            break
+        if n > 0:
+            cost = around.cost(y, around.left(y))
+            if n == rounds or cost < promised + AGAIN + ASIDE * max(cost - whiten.free, 0.0):
+                break
         y = around.best(say) if n == 0 and begun is None else around.descend(y, say)
         promised = around.cost(y, around.left(y))
     slopes = around.slopes(y)
@@ -311,12 +316,22 @@ class _Around:
         J = self.whiten(slopes).T
         return self.space.gram(J, J) + np.diag(1 / self.reach**2)
 
+    def steady(self) -> np.ndarray:
+        """Where the run began, with the nu that pull and hold ask for, which hardly depends on the other numbers."""
+        y, left = self.x.copy(), self.left(self.x)
+        if left is None:
+            return y
+        J = self.whiten(self.by_poisson)[:, None]
+        normal = float(self.space.gram(J, J)[0, 0]) + 1 / SPREAD[1] ** 2
+        y[1] += (float(self.space.gram(J, left[:, None])[0, 0]) - (y[1] - START[1]) / SPREAD[1] ** 2) / normal
+        return self.bounded(y)
+
     def starts(self) -> list[np.ndarray]:
         """A few stiffnesses and viscosities, best first."""
-        tries = [self.x]
+        tries = [self.steady()]
         for e in STIFFNESSES:
             for lag, late in [(lag, MOMENTS[1]) for lag in LAGS] + [(LAGS[1], MOMENTS[0]), (LAGS[1], MOMENTS[2])]:
-                y = self.x.copy()
+                y = tries[0].copy()
                 y[[0, 2]], y[3:] = (START[0] + e, START[2] + lag), late
                 # What may not be tried as it is is no start of its own; nor is a moment that nothing has.
                 if np.allclose(self.bounded(y), y) and (self.releases or late == MOMENTS[1]):
@@ -350,7 +365,9 @@ class _Around:
             if found is None:
                 return y
             there, left_there, cost_there, damping = found
-            done = cost - cost_there < 1.0 or (n > 0 and cost_there - HOPE * (cost - cost_there) > bar)
+            won = cost - cost_there
+            little = won < max(1.0, 0.2 * ASIDE * (cost_there - self.whiten.free))
+            done = little or (n > 0 and cost_there - HOPE * won > bar)
             y, left, cost, damping = there, left_there, cost_there, max(damping / 4, 1e-4)
             if done:
                 return y
