@@ -48,7 +48,7 @@ MOMENTS = (0.0, 0.5, 1.0)
 """Where a descent may start, in logarithms of E and of eta / E away from START, and moments of release [frames]: a
 ring-down misfits by whole periods, one that is faster than the frames looks like a slower one, and a soft body let go
 early looks like a stiff one let go late."""
-DESCENTS_FROM = 3
+DESCENTS_FROM = 4
 """Of those, from how many a descent starts."""
 STIFFER = np.log(3.0)
 """Step of log E where the body to begin with is torn apart."""
@@ -366,7 +366,7 @@ class _Around:
                 return y
             there, left_there, cost_there, damping = found
             won = cost - cost_there
-            little = won < max(1.0, 0.2 * ASIDE * (cost_there - self.whiten.free))
+            little = won < max(1.0, 0.02 * ASIDE * (cost_there - self.whiten.free))
             done = little or (n > 0 and cost_there - HOPE * won > bar)
             y, left, cost, damping = there, left_there, cost_there, max(damping / 4, 1e-4)
             if done:
