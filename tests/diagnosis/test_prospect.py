@@ -21,7 +21,7 @@ def world():
     drift = np.broadcast_to(1e-3 * course * [1.0, 0.0, 0.0], (POINTS, FRAMES, 3))
     shape = np.exp(-(((rest - rest[0]) / 0.012) ** 2).sum(1))
     pulses = np.sin(np.arange(FRAMES) / 3) ** 2
-    effect = 4e-4 * shape[:, None, None] * pulses[None, :, None] * [0.0, 0.0, 1.0]
+    effect = 6e-4 * shape[:, None, None] * pulses[None, :, None] * [0.0, 0.0, 1.0]
     seen = rng.random((POINTS, FRAMES)) > 0.1
     moved = np.where(seen[..., None], effect + 1.5 * drift + noise.draw(rest, FRAMES, rng), 0.0)
     parts = []
