@@ -18,6 +18,8 @@ from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Whitener, whitener
 
 DRAWS = 400
+STRETCH = 5
+"""Frames that are drawn together: what noise has left is alike over a few."""
 SHOWS = 25.0
 """Chi square that an effect must take away in the frames held out, were it just as predicted, to be visible there:
 such a gain is confirmed 97 times in a hundred where the law is right."""
@@ -64,19 +66,19 @@ class Prospect:
 
     @cached_property
     def draws(self) -> np.ndarray:
-        """How often each pattern is drawn, (D, M)."""
+        """How often each part of `misfit` is drawn, (D, N)."""
         rng = np.random.default_rng([self.seed, 5])
-        count = len(self.whiten.scale)
+        count = len(self.misfit(np.zeros_like(self.moved)))
         return rng.multinomial(count, np.full(count, 1 / count), DRAWS)
 
     def misfit(self, field: np.ndarray) -> np.ndarray:
-        """Chi square of the frames held out, given the fitted ones, of each pattern over the points, (M,).
+        """Chi square of the frames held out, given the fitted ones: of each pattern over the points and stretch, (N,).
 
-        field: a residual [m], (K, T, 3).
+        field: a residual [m], (K, T, 3). Stretches, because what acts everywhere is one pattern's affair alone.
         """
-        return self._parts(self.whiten_all(field), self.space_all) - self._parts(
-            self.whiten(field[:, : self.until]), self.space
-        )
+        parts = self._parts(self.whiten_all(field), self.space_all)
+        parts[:, : self.until] -= self._parts(self.whiten(field[:, : self.until]), self.space)
+        return np.add.reduceat(parts, np.arange(0, parts.shape[1], STRETCH), axis=1).ravel()
 
     def gain(self, before: np.ndarray, after: np.ndarray) -> Gain:
         """Of one prediction over another [m], (K, T, 3)."""
@@ -86,8 +88,9 @@ class Prospect:
         return Gain(float(parts.sum()), float(low), float(high), float(self.misfit(after - before).sum()))
 
     def _parts(self, white: np.ndarray, space: Metric) -> np.ndarray:
+        """Of each pattern and frame, (M, T)."""
         cleared = space.cleared(white[:, None])[:, 0].astype(float)
-        return (white * cleared).reshape(len(self.whiten.scale), -1).sum(1)
+        return (white * cleared).reshape(len(self.whiten.scale), -1, 3).sum(2)
 
 
 def prospect(case) -> Prospect | None:
