@@ -64,12 +64,12 @@ def errors(case, before, after, placebo, sigma: float) -> tuple[dict, dict]:
         result.append(
             {"noise_floor": float(floor), **{n: r[k] for n, r in rows.items()}, "flexible": parts[k], "unit": "mm"}
         )
-    low, high = _bootstrap(case, before, after)
+    low, high = bootstrap(case, before, after)
     result[1]["gain_low"], result[1]["gain_high"] = low, high
     return result[0], result[1]
 
 
-def _bootstrap(case, before, after, draws: int = 200) -> tuple[float | None, float | None]:
+def bootstrap(case, before, after, draws: int = 200) -> tuple[float | None, float | None]:
     """90 % interval of what the law takes off the held-out mean square [mm^2], points drawn again."""
     clip, until = case.clip, case.clip.until
     if clip.frames == until or not clip.seen[:, until:].any():

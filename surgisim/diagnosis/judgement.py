@@ -14,7 +14,7 @@ from scipy.special import expit
 from surgisim.diagnosis import calibration, candidates
 from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.context import Case
-from surgisim.diagnosis.errors import residual, rms
+from surgisim.diagnosis.errors import bootstrap, residual, rms
 from surgisim.diagnosis.evidence import Scores
 from surgisim.diagnosis.flexible import Bend
 from surgisim.diagnosis.hypothesis import Hypothesis
@@ -39,6 +39,8 @@ class Explanation:
     """Share of what a smooth field could explain that is left beside it."""
     outward: float | None
     """How far a push among its laws points out of the tissue (contact.py); None without one."""
+    falls: bool = False
+    """Whether the plain error of the frames held out falls with it by more than its interval."""
 
     @property
     def first(self) -> Refit:
@@ -66,7 +68,8 @@ class Explanation:
 
     @property
     def confirmed(self) -> bool:
-        return self.ahead is not None and self.ahead.confirmed
+        """By their likelihood; or by their plain error where the likelihood, which allows for a camera, agrees."""
+        return self.visible and (self.ahead.confirmed or (self.falls and self.ahead.value > 0))
 
     @property
     def visible(self) -> bool:
@@ -114,7 +117,9 @@ def explanations(case: Case, refits: list[Refit], fitted: Together, bend: Bend) 
 def _explanation(case: Case, fitted: Together, bend: Bend) -> Explanation:
     ahead = None if case.prospect is None else case.prospect.gain(case.base.simulated, fitted.moved)
     out = max((out for out, _ in pushes(case.clip.recording, fitted.refits)), default=None)
-    return Explanation(fitted, fitted.refits[0].log_evidence, ahead, still(case, bend, fitted.moved), out)
+    low, _ = bootstrap(case, case.base.simulated, fitted.moved)
+    falls = low is not None and low > 0
+    return Explanation(fitted, fitted.refits[0].log_evidence, ahead, still(case, bend, fitted.moved), out, falls)
 
 
 def judged(

@@ -1,5 +1,6 @@
 """Frames held out refute, confirm, or cannot show; what they refute gives way to the next law that they confirm."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -43,6 +44,13 @@ def test_what_frames_held_out_refute_gives_way_to_the_next_that_they_confirm():
     assert stands([blind, confirmed]) is blind
     weak = explanation(evidence=THRESHOLD - 1)
     assert stands([refuted, weak]) is refuted
+
+
+def test_a_plain_error_that_falls_confirms_where_the_likelihood_agrees():
+    unsure, against, unseen = (replace(explanation(ahead=a), falls=True) for a in (ALIKE, WORSE, BLIND))
+    assert reason(unsure) == "named"
+    assert reason(against) == "refuted"
+    assert not unseen.confirmed
 
 
 def test_what_they_gain_or_lose_counts_among_the_evidence():
