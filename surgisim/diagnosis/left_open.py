@@ -42,21 +42,26 @@ def nuisances(case: Case) -> list[dict[str, Any]]:
     return result
 
 
-def drifted(case: Case) -> float | None:
-    """How far the camera has drifted by the last fitted frame, RMS over the points [m]; None where it is left out."""
+def drifted(case: Case, after: np.ndarray | None = None) -> float | None:
+    """How far the camera has drifted by the last fitted frame, RMS over the points [m]; None where it is left out.
+
+    after: displacement of the points beside which it drifts [m], (K, T, 3); the base's if None.
+    """
     at = 0
     for group in case.groups:
         if group.name == "drift":
-            likely = case.space.likely(case.z)[at : at + len(group.columns)]
+            until = case.clip.until
+            z = case.z if after is None else case.whiten(case.clip.moved[:, :until] - after[:, :until])
+            likely = case.space.likely(z)[at : at + len(group.columns)]
             end = np.einsum("c,cki->ki", likely, group.columns[:, :, case.clip.until - 1])
             return float(np.sqrt((end**2).sum(1).mean()))
         at += len(group.columns)
     return None
 
 
-def told(case: Case) -> list[str]:
-    """Sentences on what is no tissue's physics and large all the same."""
-    said, drift = [], drifted(case)
+def told(case: Case, after: np.ndarray | None = None) -> list[str]:
+    """Sentences on what is no tissue's physics and large all the same; after: as in `drifted`."""
+    said, drift = [], drifted(case, after)
     if drift is not None and drift > LARGE * case.noise.sigma:
         said.append(f"Not tissue: the camera drifts by {1e3 * drift:.2g} mm.")
     for j, last in case.clip.releases():

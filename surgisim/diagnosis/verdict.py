@@ -227,7 +227,7 @@ def _words(case: Case, said_of: Judgement, refits, laws, z, held_out: dict) -> s
     if verdict == "nothing detectable":
         before, noise = held_out["before"], held_out["noise_floor"]
         later = (before, noise) if before is not None and before > calibration.SHOWS * noise else None
-        return words.nothing(1e-3 * detectable(case, laws)[0], later) + words.beside(told(case))
+        return words.nothing(1e-3 * detectable(case, laws)[0], later) + words.beside(told(case, said_of.after))
     if said_of.named:
         found = [(r, described_of(case, r)) for r in chosen.fitted.refits]
         said = words.sentence([(r.finding.hypothesis, p, r.finding.size) for r, p in found], said_of.explained)
@@ -236,7 +236,7 @@ def _words(case: Case, said_of: Judgement, refits, laws, z, held_out: dict) -> s
             said += f" {others[0]} would look nearly the same."
         if chosen.ahead is not None and not chosen.visible:
             said += " The frames held out cannot show it."
-        return said + words.beside(told(case))
+        return said + words.beside(told(case, said_of.after))
     if said_of.reason == "drawn":
         push = max(pushes(case.clip.recording, chosen.fitted.refits), key=lambda push: push[0])[1]
         number = next(n for n, r in enumerate(chosen.fitted.refits, 1) if r.finding.hypothesis is push)
@@ -247,7 +247,7 @@ def _words(case: Case, said_of: Judgement, refits, laws, z, held_out: dict) -> s
     left = 1 - said_of.explained if said_of.reason == "little" else chosen.left
     return words.unbelieved(
         said_of.reason, chosen.first.term, said_of.chances[chosen.first.term], left, when, where
-    ) + words.beside(told(case))
+    ) + words.beside(told(case, said_of.after))
 
 
 def described_of(case: Case, r) -> dict[str, dict]:
