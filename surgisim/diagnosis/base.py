@@ -156,11 +156,15 @@ def fit_base(
     slopes = around.slopes(y)
     spread = np.sqrt(np.diag(np.linalg.inv(around.normal(slopes))))[:3]
     x = y[:3]
-    ends = ((x - LOW < 0.02 * SPREAD) | (HIGH - x < 0.02 * SPREAD)) | (np.arange(3) == 2) * (
-        longest_lag(x[0], clip) - x[2] < 0.02
-    )
-    bound = tuple(name for name, end in zip(NAMES, ends, strict=True) if end)
-    return clip, Base(x, prepared, drive, run, simulated, near, slopes[:3] * SPREAD[:, None, None, None], spread, bound)
+    units = slopes[:3] * SPREAD[:, None, None, None]
+    return clip, Base(x, prepared, drive, run, simulated, near, units, spread, at_bound(x, clip))
+
+
+def at_bound(x: np.ndarray, clip: Clip) -> tuple[str, ...]:
+    """Names of numbers (3,) that lie at an end of what is tried."""
+    ends = (x - LOW < 0.02 * SPREAD) | (HIGH - x < 0.02 * SPREAD)
+    ends[2] |= longest_lag(x[0], clip) - x[2] < 0.02
+    return tuple(name for name, end in zip(NAMES, ends, strict=True) if end)
 
 
 def settled(clip: Clip, whiten: Whitener, space: Metric, slopes: slice, base: Base, memo: Memo) -> Base:
@@ -196,7 +200,7 @@ def settled(clip: Clip, whiten: Whitener, space: Metric, slopes: slice, base: Ba
     open_to = np.linalg.inv(np.eye(space.columns.shape[1]) + (space.columns.T @ space.columns).astype(float))
     # As uncertain as a verdict takes evidence to be: what grid and mesh still have wrong is alike in many samples.
     told = (1 / np.diag(open_to)[slopes] - 1) / calibration.TEMPERATURE
-    return replace(found, spread=SPREAD / np.sqrt(1 + told))
+    return replace(found, spread=SPREAD / np.sqrt(1 + told), bound=at_bound(found.x, clip))
 
 
 def set_to(clip: Clip, y: np.ndarray, releases: list[tuple[int, int]]) -> Clip:

@@ -63,6 +63,11 @@ class Explanation:
         return self.outward is not None and self.outward > calibration.PULLS
 
     @property
+    def sound(self) -> bool:
+        """Whether nothing speaks against it but what has not been seen."""
+        return not (self.refuted or self.loose or self.drawn) and self.log_evidence > calibration.THRESHOLD
+
+    @property
     def refuted(self) -> bool:
         return self.ahead is not None and self.ahead.refuted
 
@@ -163,8 +168,7 @@ def judged(
 def stands(tried: list[Explanation]) -> Explanation:
     """The first of them that is not refuted; one that is not the best must be confirmed."""
     for n, each in enumerate(tried):
-        sound = not (each.refuted or each.loose or each.drawn) and each.log_evidence > calibration.THRESHOLD
-        if sound and (n == 0 or each.confirmed):
+        if each.sound and (n == 0 or each.confirmed):
             return each
     return tried[0]
 
@@ -178,7 +182,7 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
     size = chosen.first.finding.hypothesis.mix.shape[1]
     for each in tried:
         fewer = each.first.finding.hypothesis.mix.shape[1] < size
-        sound = len(each.fitted.refits) == len(chosen.fitted.refits) == 1 and not each.refuted
+        sound = len(each.fitted.refits) == len(chosen.fitted.refits) == 1 and each.sound
         near = chances[each.first.term] > calibration.NEAR * chances[chosen.first.term]
         if fewer and sound and near and cos(case, chosen.first, each.first) > calibration.ALIKE:
             return each

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 from scipy.linalg import cho_solve
 
-from surgisim.diagnosis.base import HELD
 from surgisim.diagnosis.context import Case
 
 TOLD = 0.7
@@ -18,7 +17,7 @@ def nuisances(case: Case) -> list[dict[str, Any]]:
     """Every nuisance that a reader would ask for: its most likely value beside the base, and how surely."""
     likely = case.space.likely(case.z)
     spread = np.sqrt(np.diag(cho_solve(case.space.factor, np.eye(case.space.columns.shape[1]))))
-    result, at = [], 0
+    result, at, shares = [], 0, {}
     for group in case.groups:
         for n, (name, sd, unit) in enumerate(group.values):
             share = float(spread[at + n])
@@ -26,19 +25,27 @@ def nuisances(case: Case) -> list[dict[str, Any]]:
                 {"name": name, "value": float(likely[at + n] * sd), "sd": share * sd, "unit": unit,
                  "said": share < TOLD}
             )  # fmt: skip
+        shares[group.name] = float(np.sqrt((spread[at : at + len(group.columns)] ** 2).mean()))
         at += len(group.columns)
     drift = drifted(case)
     if drift is not None:
-        result.append({"name": "camera drift by the end", "value": drift, "sd": case.drift, "unit": "m", "said": True})
-    for j, last in case.clip.releases():
-        late = float(case.clip.opening[j, last])
+        share = shares["drift"]
         result.append(
-            {"name": f"opening of grip {j} after its last active frame", "value": late, "sd": 0.2, "unit": "frames",
-             "said": True}
+            {"name": "camera drift by the end", "value": drift, "sd": share * case.drift, "unit": "m",
+             "said": share < TOLD}
         )  # fmt: skip
-    if case.clip.raised:
-        name = "where what is held was laid anew, beyond its box"
-        result.append({"name": name, "value": case.clip.raised, "sd": HELD, "unit": "m", "said": True})
+    fitted = {entry["name"]: entry for entry in result}
+    for j, last in case.clip.releases():
+        # What is left of it beside the moment that the base was fitted with.
+        rest = fitted.get(f"release of grip {j} after frame {last}")
+        if rest is not None:
+            late = float(case.clip.opening[j, last]) + case.clip.fps * rest["value"]
+            name = f"opening of grip {j} after its last active frame"
+            result.append(rest | {"name": name, "value": late, "sd": case.clip.fps * rest["sd"], "unit": "frames"})
+    held = fitted.get("where what is held ends")
+    if case.clip.raised and held is not None:
+        name = "where what is held ends, laid anew, beyond its box"
+        result.append(held | {"name": name, "value": case.clip.raised + held["value"]})
     return result
 
 

@@ -22,7 +22,7 @@ STRETCH = 5
 """Frames that are drawn together: what noise has left is alike over a few."""
 SHOWS = 25.0
 """Chi square that an effect must take away in the frames held out, were it just as predicted, to be visible there:
-such a gain is confirmed 97 times in a hundred where the law is right."""
+2.5 standard deviations of what noise alone makes of such a gain, which are twice its root."""
 
 
 @dataclass(frozen=True)
