@@ -107,6 +107,18 @@ class Clip:
         found = [(j, last) for j, on in enumerate(self.motion.active) for _, last in runs(on)]
         return [(j, last) for j, last in found if last < before]
 
+    def opens(self, late: np.ndarray) -> "Clip":
+        """The same with fitted releases so many frames after their grips' last active ones, (R,); as it is with none.
+
+        Later releases, of which nothing is fitted, are taken to fall as those do.
+        """
+        if not len(late):
+            return self
+        opening = np.full(self.opening.shape, float(np.mean(late)))
+        for (j, t), after in zip(self.releases(), late, strict=True):
+            opening[j, t] = after
+        return replace(self, late=opening)
+
     def laid(self, *, share: float | None = None, raised: float | None = None) -> "Clip":
         """The same on a grid of another spacing, over the cube root of the body's volume, or held further up [m].
 

@@ -11,9 +11,9 @@ from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.flexible import Flexible, flexible
 from surgisim.diagnosis.memo import Memo
-from surgisim.diagnosis.metric import Metric
+from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener
-from surgisim.diagnosis.nuisance import Group
+from surgisim.diagnosis.nuisance import Group, positions, release
 from surgisim.diagnosis.prospect import Prospect, prospect
 
 ON_A_GPU = 8
@@ -46,6 +46,12 @@ class Case:
     def misfit(self) -> float:
         """Chi square of the base beside everything that is no physics."""
         return float(self.space.gram(self.z[:, None], self.z[:, None])[0, 0])
+
+    @cached_property
+    def beside_base(self) -> Metric:
+        """What a residual may hold beside a base whose numbers and moments of release the engine searches."""
+        searched = positions(self.groups, {release(*each) for each in self.clip.releases()})
+        return metric(np.delete(self.space.columns, [*range(*self.slopes.indices(10**9)), *searched], axis=1))
 
     @cached_property
     def flexible(self) -> Flexible:

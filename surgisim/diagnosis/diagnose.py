@@ -10,7 +10,8 @@ from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, judgement, nuisance, verdict
-from surgisim.diagnosis.base import HELD, fit_base, settled
+from surgisim.diagnosis.base import HELD, Base
+from surgisim.diagnosis.base_fit import fit_base, settled
 from surgisim.diagnosis.candidates import Parts, blocks, costly, finer
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.context import Case, workers
@@ -134,7 +135,7 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
         groups = nuisance.of_base(clip, simulated, error, drift, settings)
         return whitened(whiten, groups, until)
 
-    def placed(clip: Clip, begun: np.ndarray | None) -> Case:
+    def placed(clip: Clip, begun: Base | None) -> Case:
         clip, base = fit_base(
             clip, whiten, beside, memo, workers=workers(clip, settings), timing="release" not in settings.without,
             begun=begun, say=lambda text: progress(0.1, 1, text),
@@ -154,7 +155,7 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     if abs(off) > nuisance.FAR_OFF:
         # So far a plane's effect is not in proportion: what is held is laid anew, where it seems to end.
         try:
-            moved = placed(case.clip.laid(raised=float(np.clip(off, -MOST_HELD, MOST_HELD))), case.base.x)
+            moved = placed(case.clip.laid(raised=float(np.clip(off, -MOST_HELD, MOST_HELD))), case.base)
         except (Problem, Breakdown):
             return case
         costs = [c.misfit + (c.clip.raised / HELD) ** 2 for c in (case, moved)]

@@ -46,8 +46,11 @@ def beside(h: Hypothesis, amplitude: np.ndarray, stiffer: float) -> tuple[Hypoth
 
 
 def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = None) -> np.ndarray:
-    """Displacement of the points with the law [m], (K, frames, 3), by the engine. Raises what is IMPOSSIBLE."""
-    frames = frames or clip.frames
+    """Displacement of the points with the law [m], (K, frames, 3), by the engine. Raises what is IMPOSSIBLE.
+
+    base: its x may be followed by moments of release, (3 + R,).
+    """
+    frames, clip = frames or clip.frames, clip.opens(base.x[3:])
     values = {**base.values, **law.values}
     motion = clip.motion if law.motion is None else law.motion
 
@@ -75,7 +78,9 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
 
     moved = None if law.motion is None else np.round(law.motion.position, 9).tolist()
     where = {n: [list(p.center), p.extent, p.normal] for n, p in law.places.items()}
-    return memo(["law", base.x.tolist(), values, _plain(where), moved, frames, *clip.kind], make)["seen"].astype(float)
+    return memo(["law", base.x[:3].tolist(), values, _plain(where), moved, frames, *clip.kind], make)["seen"].astype(
+        float
+    )
 
 
 def steps(clip: Clip, prepared: Prepared, theta: np.ndarray, safety: float = SAFETY) -> int:

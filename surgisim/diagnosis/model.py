@@ -30,7 +30,7 @@ def physics(case, refits) -> Physics:
     """The base's laws and the named ones, with the grid and a stable step."""
     clip, base = case.clip, case.base
     if refits and refits[0].x is not None:
-        base = replace(base, x=refits[0].x)
+        base = replace(base, x=refits[0].x[:3], spread=base.spread if refits[0].spread is None else refits[0].spread)
     values, where, known = dict(base.values), {}, base_numbers(base)
     for r in refits:
         h, law = r.finding.hypothesis, law_of(r.finding.hypothesis, r.amplitude, clip)

@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis.base import HELD, LATE, LATEST, Base, by_held, tracks_of
+from surgisim.diagnosis.base import HELD, Base, by_held, tracks_of
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import hats, plane
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.noise import Noise, whitener
+from surgisim.diagnosis.ring_down import LATE, LATEST
 from surgisim.estimation.trial import at_once
 from surgisim.mpm.simulator import Breakdown
 from surgisim.problem import Problem
@@ -97,6 +98,15 @@ def likely_held(groups: list[Group], likely: np.ndarray) -> float:
             return HELD * float(likely[at])
         at += len(group.columns)
     return 0.0
+
+
+def positions(groups: list[Group], names: set[str]) -> list[int]:
+    """Where the columns of these values stand among all groups' columns."""
+    found, at = [], 0
+    for group in groups:
+        found += [at + n for n, (name, *_) in enumerate(group.values) if name in names]
+        at += len(group.columns)
+    return found
 
 
 def camera(clip: Clip, simulated: np.ndarray) -> list[Group]:
@@ -223,7 +233,7 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
         sd, by = (SOON if known else LATE), (-0.25 if clip.opening[j, last] > LATEST - 0.25 else 0.25)
         late = clip.opening.copy()
         late[j, last] += by
-        when = (f"release of grip {j} after frame {last}", sd / clip.fps, "s")
+        when = (release(j, last), sd / clip.fps, "s")
         runs.append(("release", when, replace(clip, late=late), None, sd / by))
 
     def moved(run, _worker: int) -> np.ndarray | None:
@@ -241,6 +251,11 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
     if "grip radius" in groups:
         groups["grip radius"] = _not_a_ball(clip, groups["grip radius"])
     return list(groups.values())
+
+
+def release(grip: int, last: int) -> str:
+    """What the moment is called at which a grip opens, after the last frame in which it holds."""
+    return f"release of grip {grip} after frame {last}"
 
 
 def _not_a_ball(clip: Clip, radius: Group) -> Group:

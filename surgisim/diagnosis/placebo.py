@@ -53,7 +53,7 @@ def wrong(named: Together, refits: list[Refit], laws: dict) -> list[Finding]:
 
 
 def held(case, x: np.ndarray):
-    """The case with the base's numbers held at x, (3,). Raises what IMPOSSIBLE names."""
+    """The case with the base's numbers held at x, (3 + R,). Raises what IMPOSSIBLE names."""
     base, until = based(case, x), case.clip.until
     z = case.z - case.whiten(base.simulated[:, :until] - case.base.simulated[:, :until])
     return replace(case, base=base, z=z, space=metric(np.delete(case.space.columns, case.slopes, axis=1)))

@@ -2,8 +2,9 @@
 
 What the search found is the start. The engine itself runs at every trial (Levenberg-Marquardt; forward differences at
 first, then Broyden's secants), so that what the tangent cannot show, a lump so stiff that it moves as one, counts. The
-base's E, nu and eta are free in the same runs, because a base fitted without the law has made up for it; the other
-nuisances stay free through the metric. Each number has a prior around its start, as wide as the search was coarse.
+base's E, nu and eta, and the moments of release, are free in the same runs, because a base fitted without the law has
+made up for it; the other nuisances stay free through the metric. Each number of a law has a prior around its start, as
+wide as the search was coarse.
 
 Broyden, A class of methods for solving nonlinear simultaneous equations, Mathematics of Computation 19 (1965).
 """
@@ -15,11 +16,11 @@ import numpy as np
 
 from surgisim.diagnosis import calibration, candidates
 from surgisim.diagnosis.base import SPREAD, START, bounded
-from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.clip import OPENS, Clip
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.knobs import Knob, Start
 from surgisim.diagnosis.laws import IMPOSSIBLE, Law, beside, joined, law_of, respond
-from surgisim.diagnosis.metric import metric
+from surgisim.diagnosis.ring_down import EARLIEST, LATE, LATEST
 from surgisim.estimation.trial import at_once
 
 STEP = 0.3
@@ -39,7 +40,9 @@ class Refined:
     draws: list[list[Start]]
     """The same laws, drawn from their posterior: a list for each."""
     x: np.ndarray
-    """The base that goes with it, (3,)."""
+    """The base that goes with it and its moments of release, (3 + R,)."""
+    spread: np.ndarray
+    """Posterior standard deviation of E, nu and eta, (3,)."""
     response: np.ndarray
     """What the laws and their own base add to the base over the whole clip [m], (K, T, 3)."""
     gain: float
@@ -52,18 +55,24 @@ def refined(
 ) -> Refined | None:  # fmt: skip
     """The best laws near `starts`, whose response together [m], (K, T, 3), is known.
 
-    case: a `diagnose.Case`; z: whitened residual of the base, (N,); base_at: a base to begin with as well, (3,). None
-    where the engine breaks down at the start.
+    case: a `diagnose.Case`; z: whitened residual of the base, (N,); base_at: a base to begin with as well, (3 + R,).
+    None where the engine breaks down at the start.
     """
     clip, base, whiten, until = case.clip, case.base, case.whiten, case.clip.until
     knobs = [candidates.of(h).knobs(h, amplitude) for h, amplitude in starts]
     own = sum(len(k) for k in knobs)
     name = " and ".join(h.term for h, _ in starts)
-    # The base is searched by the engine: its slopes leave the metric.
-    space = metric(np.delete(case.space.columns, case.slopes, axis=1))
+    space = case.beside_base
+    shown = clip.releases() if "release" not in case.settings.without else []
+    late = np.array([clip.opening[j, t] for j, t in shown])
+    start, reach = np.concatenate([base.x, late]), np.concatenate([SPREAD, np.full(len(late), LATE)])
+
+    def base_of(x: np.ndarray) -> np.ndarray:
+        there = start + x[own:] * reach
+        return np.concatenate([bounded(there[:3], clip), np.clip(there[3:], EARLIEST, LATEST)])
 
     def all_turned(x: np.ndarray) -> tuple[list[Start], np.ndarray]:
-        there, at, found = bounded(base.x + x[own:] * SPREAD, clip), 0, []
+        there, at, found = base_of(x), 0, []
         for (h, amplitude), mine in zip(starts, knobs, strict=True):
             here = turned(h, amplitude, mine, x[at : at + len(mine)], clip)
             # Only what pushes or resists over the tissue's own stiffness shows.
@@ -84,13 +93,16 @@ def refined(
         return z - whiten(moved - base.simulated[:, :until])
 
     def cost(x: np.ndarray, r: np.ndarray | None) -> float:
-        return np.inf if r is None else float(space.gram(r[:, None], r[:, None])[0, 0] + x @ x)
+        return np.inf if r is None else float(space.gram(r[:, None], r[:, None])[0, 0] + ((x - prior) ** 2).sum())
 
     likely = case.space.likely(z - whiten(response[:, :until]))[case.slopes]
-    usual = (np.array([START[0], base.x[1], START[2]]) - base.x) / SPREAD
-    bases = [0 * usual, np.clip(likely, -2, 2), usual]
+    likely = np.concatenate([np.clip(likely, -2, 2), 0 * late])
+    usual = (np.concatenate([[START[0], base.x[1], START[2]], 0 * late + OPENS]) - start) / reach
+    # Each law's numbers have a prior around where they begin, the base's around what tissue is.
+    prior = np.concatenate([np.zeros(own), (np.concatenate([START, 0 * late + OPENS]) - start) / reach])
+    bases = [0 * usual, likely, usual]
     if base_at is not None:
-        bases.append((base_at - base.x) / SPREAD)
+        bases.append((base_at - start) / reach)
     begins = [np.concatenate([np.zeros(own), by]) for by in bases]
     say(f"{name} with all numbers free")
     residuals = at_once(left, begins, case.workers)
@@ -98,7 +110,8 @@ def refined(
     x, r = begins[k], residuals[k]
     if r is None:
         return None
-    nothing, best, damping = float(case.space.gram(z[:, None], z[:, None])[0, 0]), cost(x, r), 0.1
+    nothing = float(case.space.gram(z[:, None], z[:, None])[0, 0] + prior @ prior)
+    best, damping = cost(x, r), 0.1
     J, fresh, normal = None, 0, np.eye(len(x))
     for n in range(ROUNDS):
         say(f"{name} with all numbers free, round {n + 1} of at most {ROUNDS}")
@@ -107,7 +120,7 @@ def refined(
             J = np.stack([np.zeros_like(r) if s is None else (r - s) / STEP for s in sides], 1)
             fresh += 1
         normal = space.gram(J, J) + np.eye(len(x))
-        pull = space.gram(J, r[:, None])[:, 0] - x
+        pull = space.gram(J, r[:, None])[:, 0] - (x - prior)
         steps = [
             np.clip(np.linalg.solve(normal + f * damping * np.diag(np.diag(normal)), pull), -1.5, 1.5)
             for f in (0.1, 3.0)
@@ -137,7 +150,8 @@ def refined(
     spread = np.linalg.inv((normal - np.eye(len(x))) / heat + np.eye(len(x)))
     rng = np.random.default_rng([case.settings.seed, 3])
     draws = [all_turned(near)[0] for near in rng.multivariate_normal(x, spread, DRAWS)]
-    return Refined(all_turned(x)[0], [list(d) for d in zip(*draws, strict=True)], there, response, nothing - best)
+    laws, near = [list(d) for d in zip(*draws, strict=True)], np.sqrt(np.diag(spread)[own : own + 3]) * SPREAD
+    return Refined(all_turned(x)[0], laws, there, near, response, nothing - best)
 
 
 def turned(h: Hypothesis, amplitude: np.ndarray, knobs: Sequence[Knob], x: np.ndarray, clip: Clip) -> Start:

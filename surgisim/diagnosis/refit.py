@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.diagnosis.base import BOLD
+from surgisim.diagnosis.base_fit import without
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
@@ -26,7 +27,9 @@ class Refit:
     gain: float
     log_evidence: float
     x: np.ndarray | None = None
-    """The base that was fitted with it, (3,); None where the base stayed."""
+    """The base that was fitted with it, and its moments of release, (3 + R,); None where the base stayed."""
+    spread: np.ndarray | None = None
+    """Posterior standard deviation of that base's numbers, (3,)."""
     draws: tuple[tuple[Hypothesis, np.ndarray], ...] = ()
     """The law with other numbers that would do, drawn from its posterior; none where it was not fitted freely."""
 
@@ -75,13 +78,16 @@ def freed(case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
 
     Its gain is never less than before: there the base moved along its tangent, which takes more than tissue gives.
     """
-    found = refined(case, z, [(one.finding.hypothesis, one.amplitude)], one.response, say)
+    say(f"the base beside {one.term}")
+    base_at, aside = without(case, one.response, say)
+    found = refined(case, z, [(one.finding.hypothesis, one.amplitude)], one.response, say, base_at)
     if found is None:
         return one
     (hypothesis, amplitude), gain = found.laws[0], max(found.gain, one.gain)
     evidence = one.log_evidence + 0.5 * (gain - one.gain)
     finding = replace(one.finding, hypothesis=hypothesis)
-    return Refit(finding, amplitude, found.response, gain, evidence, found.x, tuple(found.draws[0]))
+    spread = np.hypot(found.spread, aside)
+    return Refit(finding, amplitude, found.response, gain, evidence, found.x, spread, tuple(found.draws[0]))
 
 
 def fit_of_a_law(case) -> float:

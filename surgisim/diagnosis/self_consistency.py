@@ -17,7 +17,8 @@ def drawn(case: Case, rng: np.random.Generator) -> np.ndarray:
     moved = base.simulated + case.noise.draw(clip.rest, clip.frames, rng)
     for group in case.groups:
         moved = moved + np.tensordot(rng.standard_normal(len(group.columns)), group.columns, (0, 0))
-    share = np.minimum(base.spread / SPREAD, 1.0) * rng.standard_normal(len(base.slopes))
+    near = np.sqrt(np.maximum(base.spread**2 - base.aside**2, 0)) / SPREAD
+    share = np.minimum(near, 1.0) * rng.standard_normal(len(base.slopes))
     moved[:, : clip.until] += np.tensordot(share, base.slopes, (0, 0))
     if case.settings.offsets:
         moved = moved + case.noise.level[:, None, None] * rng.standard_normal((len(clip.rest), 1, 3))

@@ -20,13 +20,13 @@ class Together:
     gain: float
     """Of chi square over the base alone."""
     x: np.ndarray
-    """The base that goes with them, (3,)."""
+    """The base that goes with them, and its moments of release, (3 + R,)."""
     beside: "Together | None" = None
     """What else was fitted: one law instead of two, or the other way round."""
 
 
 def based(case, x: np.ndarray) -> Base:
-    """The base with other numbers, (3,), run anew. Raises what IMPOSSIBLE names."""
+    """The base with other numbers, (3 + R,), run anew. Raises what IMPOSSIBLE names."""
     clip, base = case.clip, case.base
     drive, run = simulate(base.prepared, clip, x, case.memo, clip.frames)
     simulated = carried(base.prepared.simulator.carry(clip.rest), run)
@@ -102,8 +102,16 @@ def _freed(case, refits: list, say) -> list[Together]:
     found = refined(case, case.z, starts, sum(r.response for r in refits), say, refits[0].x)
     if found is None:
         return []
+    spread = found.spread if refits[0].spread is None else np.maximum(found.spread, refits[0].spread)
     mine = [
-        replace(r, finding=replace(r.finding, hypothesis=h), amplitude=amplitude, x=found.x, draws=tuple(draws))
+        replace(
+            r,
+            finding=replace(r.finding, hypothesis=h),
+            amplitude=amplitude,
+            x=found.x,
+            spread=spread,
+            draws=tuple(draws),
+        )
         for r, (h, amplitude), draws in zip(refits, found.laws, found.draws, strict=True)
     ]
     return [prediction(case, mine, case.base.simulated + found.response, found.x)]
@@ -113,7 +121,8 @@ def _moved(case, refits: list) -> list[Together]:
     clip, base, until, first = case.clip, case.base, case.clip.until, refits[0].x
     left = case.z - sum(case.whiten(r.response[:, :until]) for r in refits)
     likely = case.space.likely(left)[case.slopes]
-    x = bounded((base.x if first is None else first) + likely * SPREAD, clip)
+    x = base.x if first is None else first
+    x = np.concatenate([bounded(x[:3] + likely * SPREAD, clip), x[3:]])
     try:
         moved = based(case, x)
         simulated = moved.simulated

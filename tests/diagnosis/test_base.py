@@ -7,8 +7,10 @@ import pytest
 from planted import GRID, TRUE, case_of, memo_of, plain, recording
 
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis import base as fitting
-from surgisim.diagnosis.base import SPREAD, START, TERMS
+from surgisim.diagnosis import base_fit as fitting
+from surgisim.diagnosis import ring_down
+from surgisim.diagnosis.base import START, TERMS
+from surgisim.diagnosis.calibration import TEMPERATURE
 from surgisim.diagnosis.clip import OPENS, clip_of
 from surgisim.diagnosis.diagnose import prepare_case
 from surgisim.diagnosis.memo import Memo
@@ -43,12 +45,21 @@ def test_ever_stiffer_bodies_are_tried_until_one_stands(monkeypatch):
 @pytest.mark.parametrize(("dearer", "softest"), [(1.5, True), (2.5, False)])
 def test_of_bodies_that_look_alike_the_softest_is_taken(dearer, softest):
     soft, stiff = (START + by * np.eye(3)[0] for by in (-1.0, 1.0))
-    around = SimpleNamespace(
-        reach=SPREAD, releases=[], starts=lambda: [stiff, soft], left=lambda y: None,
-        descend=lambda y, *_: y, cost=lambda y, left: 100.0 + dearer * (y[0] < START[0]),
-    )  # fmt: skip
-    found = fitting._Around.best(around, lambda text: None)
+    ends = [ring_down.Descent(y, None, cost) for y, cost in ((stiff, 100.0), (soft, 100.0 + dearer))]
+    found, _ = ring_down.RingDown.best(SimpleNamespace(descents=lambda say: ends), lambda text: None)
     assert found is (soft if softest else stiff)
+
+
+def test_bodies_that_fit_about_as_well_are_part_of_how_surely_one_is_known():
+    soft, stiff = (START + by * np.eye(3)[0] for by in (-1.0, 1.0))
+    best = ring_down.Descent(soft, None, 100.0)
+
+    def away(dearer: float) -> np.ndarray:
+        return ring_down.apart(best, [best, ring_down.Descent(stiff, None, 100.0 + dearer)])
+
+    assert away(0.0) == pytest.approx([np.sqrt(2.0), 0, 0])
+    assert away(2 * TEMPERATURE * np.log(3.0)) == pytest.approx([1.0, 0, 0])
+    assert away(1e3) == pytest.approx([0, 0, 0], abs=1e-9)
 
 
 def test_a_base_is_fitted_anew_where_a_run_fits_worse_than_promised(monkeypatch):

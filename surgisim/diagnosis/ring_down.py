@@ -1,0 +1,255 @@
+"""E, viscosity and moments of release, by what a release looks like: short runs that begin just before it.
+
+Chi square has many valleys: a ring-down misfits by whole periods, one that is faster than the frames looks like a
+slower one, and a soft body let go early looks like a stiff one let go late. So the search begins with stiffnesses all
+over the range and gives up the worst, a few steps at a time. Where each of them ended is kept: bodies that fit about as
+well are part of how surely a base is known.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from surgisim.diagnosis import calibration
+from surgisim.diagnosis.base import SPREAD, START, bounded, carried, run_base, values_of
+from surgisim.diagnosis.clip import OPENS, Clip
+from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.metric import Metric
+from surgisim.diagnosis.noise import Whitener
+from surgisim.estimation.trial import at_once
+from surgisim.mpm.setup import Prepared
+from surgisim.mpm.simulator import Breakdown, Run
+
+STEP = np.array([0.2, 0.01, 0.3])
+LATE = 0.5
+"""Standard deviation of the moment of a release about the middle of the interval in which it falls [frames]; one that
+is the same everywhere in it has .29, and whoever marks frames may be a frame off."""
+EARLIEST, LATEST = -1.4, 2.4
+"""Of a release after a grip's last active frame that is tried [frames]."""
+STIFFNESSES = tuple(np.log(np.geomspace(6e2, 3.6e4, 8)) - START[0])
+LAGS = tuple(np.log(np.array([2e-4, 2e-3, 1.2e-2])) - START[2])
+MOMENTS = (0.0, 0.5, 1.0)
+"""Where a descent may start, in logarithms of E and of eta / E away from START, and moments of release [frames]. A step
+of 1.8 in E is one of a third in pitch: within half a period of the next one while a ring-down lasts two."""
+KEPT = ((1, 5), (2, 3))
+"""Steps that every descent still tried goes, and how many go on then."""
+DESCENTS = 8
+"""Steps at most of those that are left."""
+SAME = 0.1
+"""Prior standard deviations within which two descents are one."""
+ALIKE = 2.0
+"""What chi square a softer body may cost more. Tissue that creeps back tells eta / E alone: of bodies that look alike
+the softest takes the longest steps."""
+ASIDE = 0.05
+"""Share of what a base leaves unexplained, noise aside, below which nothing about it is worth another step: where
+something is hidden no base fits, and its numbers are fitted again with every law."""
+AFTER = 0.5
+"""How long a short run goes on after the release [s]."""
+
+
+@dataclass
+class Descent:
+    """One way down."""
+
+    y: np.ndarray
+    """(3 + R,)"""
+    left: np.ndarray | None
+    """Whitened residual, (N,); None where tissue like that is torn apart."""
+    cost: float
+    damping: float = 1e-2
+    done: bool = False
+
+
+@dataclass(frozen=True)
+class RingDown:
+    """Tracks near a run at `x`: nu moves them along its slope; E, eta and moments of release by short runs from the
+    run's own states."""
+
+    clip: Clip
+    whiten: Whitener
+    space: Metric
+    memo: Memo
+    bodies: list[Prepared]
+    """One for each short run at a time."""
+    carry: object
+    x: np.ndarray
+    """(3 + R,), R the releases whose moments are free."""
+    run: Run
+    simulated: np.ndarray
+    """Of the run [m], (K, T_fit, 3)."""
+    by_poisson: np.ndarray
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Of the prior, (3 + R,)."""
+        return np.concatenate([START, np.full(len(self.x) - 3, OPENS)])
+
+    @property
+    def reach(self) -> np.ndarray:
+        """Its standard deviation, (3 + R,)."""
+        return np.concatenate([SPREAD, np.full(len(self.x) - 3, LATE)])
+
+    def bounded(self, y: np.ndarray) -> np.ndarray:
+        return np.concatenate([bounded(y[:3], self.clip), np.clip(y[3:], EARLIEST, LATEST)])
+
+    def tracks(self, y: np.ndarray, body: int = 0) -> np.ndarray:
+        """Displacement of the points [m], (K, T_fit, 3)."""
+        rates = np.array([y[0], self.x[1], y[2]])
+        clip = self.clip.opens(y[3:])
+        result = self.simulated.copy()
+        for first, last in windows(self.clip):
+            what = ["short", self.x.tolist(), rates.tolist(), first, last, *clip.kind]
+            seen = self.memo(what, lambda f=first, t=last: {"seen": self._short(clip, self.bodies[body], rates, f, t)})[
+                "seen"
+            ]
+            result[:, first + 1 : last + 1] = seen
+        return result + (y[1] - self.x[1]) * self.by_poisson
+
+    def _short(self, clip: Clip, body: Prepared, rates: np.ndarray, first: int, last: int) -> np.ndarray:
+        before = self.run if first else None
+        return carried(self.carry, run_base(body, clip, values_of(rates), before=before, first=first, last=last))[:, 1:]
+
+    def left(self, y: np.ndarray, body: int = 0) -> np.ndarray | None:
+        """Whitened residual, (N,); None where tissue like that is torn apart."""
+        try:
+            return self.whiten(self.clip.moved[:, : self.clip.until] - self.tracks(y, body))
+        except Breakdown:
+            return None
+
+    def cost(self, y: np.ndarray, left: np.ndarray | None) -> float:
+        if left is None:
+            return np.inf
+        prior = (((y - self.middle) / self.reach) ** 2).sum()
+        return float(self.space.gram(left[:, None], left[:, None])[0, 0] + prior)
+
+    def slopes(self, y: np.ndarray) -> np.ndarray:
+        """Derivative of the points' displacement by y [m], (3 + R, K, T_fit, 3)."""
+        late = np.where(y[3:] > LATEST - 0.3, -0.2, 0.2)
+        aside = np.concatenate([[STEP[0]], [STEP[2]], late])
+        ways = np.eye(len(y))[[0, 2, *range(3, len(y))]]
+        middle, *moved = at_once(
+            self.tracks, [y, *(y + a * e for a, e in zip(aside, ways, strict=True))], len(self.bodies)
+        )
+        stiffer, slower, *later = ((m - middle) / a for m, a in zip(moved, aside, strict=True))
+        return np.stack([stiffer, self.by_poisson, slower, *later])
+
+    def normal(self, slopes: np.ndarray) -> np.ndarray:
+        J = self.whiten(slopes).T
+        return self.space.gram(J, J) + np.diag(1 / self.reach**2)
+
+    def steady(self) -> np.ndarray:
+        """Where the run began, with the nu that pull and hold ask for, which hardly depends on the other numbers."""
+        y, left = self.x.copy(), self.left(self.x)
+        if left is None:
+            return y
+        J = self.whiten(self.by_poisson)[:, None]
+        normal = float(self.space.gram(J, J)[0, 0]) + 1 / SPREAD[1] ** 2
+        y[1] += (float(self.space.gram(J, left[:, None])[0, 0]) - (y[1] - START[1]) / SPREAD[1] ** 2) / normal
+        return self.bounded(y)
+
+    def begun(self, y: np.ndarray, body: int = 0) -> Descent:
+        left = self.left(y, body)
+        return Descent(y, left, self.cost(y, left))
+
+    def starts(self) -> list[Descent]:
+        """Where the run began, and the best viscosity and moment of release for each stiffness."""
+        steady = self.steady()
+        late = (0.0,) if len(steady) == 3 else MOMENTS
+        ways = [(lag, late[len(late) // 2]) for lag in LAGS] + [(LAGS[1], t) for t in (late[0], late[-1]) if late[1:]]
+        tries, groups = [steady], [0]
+        for n, e in enumerate(STIFFNESSES, 1):
+            for lag, opens in ways:
+                y = steady.copy()
+                y[[0, 2]], y[3:] = (START[0] + e, START[2] + lag), opens
+                # What may not be tried as it is is no start of its own.
+                if np.allclose(self.bounded(y), y):
+                    tries.append(y)
+                    groups.append(n)
+        found = at_once(self.begun, tries, len(self.bodies))
+        best = [min((d for d, k in zip(found, groups, strict=True) if k == n), key=lambda d: d.cost, default=None)
+                for n in range(len(STIFFNESSES) + 1)]  # fmt: skip
+        return [d for d in best if d is not None and np.isfinite(d.cost)]
+
+    def descents(self, say: Callable[[str], None], tries: list[Descent] | None = None) -> list[Descent]:
+        """Where descents from all over the range got to, best first; those given up early are among them."""
+        going, ended = self.starts() if tries is None else tries, []
+        for steps, keep in (*KEPT, (DESCENTS, 0)):
+            for each in going:
+                self.descend(each, say, steps)
+            going = sorted(going, key=lambda d: d.cost)
+            single: list[Descent] = []
+            for each in going:
+                away = [np.abs((each.y - other.y) / self.reach).max() for other in single]
+                if min(away, default=np.inf) > SAME:
+                    single.append(each)
+            ended += single[keep:]
+            going = single[:keep]
+        return sorted(ended, key=lambda d: d.cost)
+
+    def best(self, say: Callable[[str], None]) -> tuple[np.ndarray, np.ndarray]:
+        """The best body, or a softer one that fits as well, (3 + R,), and how far others about as good are, (3,)."""
+        ends = self.descents(say)
+        chosen = min((d for d in ends if d.cost < ends[0].cost + ALIKE), key=lambda d: d.y[0])
+        return chosen.y, apart(chosen, ends)
+
+    def descend(self, at: Descent, say: Callable[[str], None], steps: int = DESCENTS) -> None:
+        """Levenberg-Marquardt, some steps on."""
+        for _ in range(steps):
+            if at.done or at.left is None:
+                return
+            say(f"base: {told(at.y)}")
+            slopes = self.slopes(at.y)
+            normal = self.normal(slopes)
+            pull = self.space.gram(self.whiten(slopes).T, at.left[:, None])[:, 0] - (at.y - self.middle) / self.reach**2
+            before = at.cost
+            if not self._downhill(at, normal, pull):
+                at.done = True
+                return
+            at.done = before - at.cost < max(1.0, 0.02 * ASIDE * (at.cost - self.whiten.free))
+
+    def _downhill(self, at: Descent, normal: np.ndarray, pull: np.ndarray) -> bool:
+        """Take the first damped step that costs less; whether there is one.
+
+        A grip that opens before a frame instead of in it shows there at once, which no slope foretells: where a step
+        runs into that, moments of release stay and the body alone moves.
+        """
+        for free in sorted({len(at.y), 3}, reverse=True):
+            inner, more = normal[:free, :free], at.damping
+            for _ in range(4):
+                step = np.zeros(len(at.y))
+                step[:free] = np.linalg.solve(inner + more * np.diag(np.diag(inner)), pull[:free])
+                there = self.begun(self.bounded(at.y + np.clip(step, -1.2 * self.reach, 1.2 * self.reach)))
+                if there.cost < at.cost:
+                    at.y, at.left, at.cost, at.damping = there.y, there.left, there.cost, max(more / 4, 1e-4)
+                    return True
+                more *= 8
+        return False
+
+
+def apart(chosen: Descent, ends: list[Descent]) -> np.ndarray:
+    """Standard deviation of x, (3,), among descents about the chosen one, each as probable as its chi square says."""
+    off = np.array([d.cost - chosen.cost for d in ends])
+    # No surer than a verdict takes evidence to be: what grid and mesh still have wrong is alike in many samples.
+    weight = np.exp(-0.5 * np.maximum(off, 0) / calibration.TEMPERATURE)
+    away = np.stack([d.y[:3] - chosen.y[:3] for d in ends])
+    return np.sqrt((weight[:, None] * away**2).sum(0) / weight.sum())
+
+
+def told(y: np.ndarray) -> str:
+    """Of numbers (3 + R,), for a reader."""
+    opens = f", opens {' and '.join(f'{late:.2f}' for late in y[3:])} frames late" if len(y) > 3 else ""
+    return f"E {np.exp(y[0]):.0f} Pa, nu {y[1]:.3f}, eta {np.exp(y[0] + y[2]):.2f} Pa s{opens}"
+
+
+def windows(clip: Clip) -> list[tuple[int, int]]:
+    """From just before each release for a while, none overlapping; everything where nothing is released."""
+    found: list[tuple[int, int]] = []
+    for _, end in sorted(clip.releases(), key=lambda r: r[1]):
+        first, last = max(end - 2, 0), min(clip.until - 1, end + math.ceil(AFTER * clip.fps))
+        if found and first <= found[-1][1]:
+            found[-1] = found[-1][0], max(last, found[-1][1])
+        else:
+            found.append((first, last))
+    return found or [(0, clip.until - 1)]
