@@ -1,5 +1,6 @@
 """The base's fit: stiffness, viscosity and the moment of a release together; of bodies that look alike the softest."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +15,7 @@ from surgisim.diagnosis.calibration import TEMPERATURE
 from surgisim.diagnosis.clip import OPENS, clip_of
 from surgisim.diagnosis.diagnose import prepare_case
 from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.together import based
 from surgisim.mpm.simulator import Breakdown
 
 QUICK = 50.0
@@ -81,6 +83,31 @@ def test_a_base_is_fitted_anew_where_a_run_fits_worse_than_promised(monkeypatch)
 def test_a_body_is_found_within_what_is_said_of_it():
     case = plain()
     assert (np.abs(case.base.x - TRUE) < 2.5 * case.base.spread).all()
+
+
+def test_with_a_law_taken_off_the_base_is_found_again_from_far_off():
+    made = plain()
+    far = np.array([TRUE[0] + np.log(8.0), made.base.x[1], TRUE[2] - 1.0])
+    case = replace(made, base=based(made, far))
+    # A push that fades in and out between the points' own motion stands for a law's response.
+    response = 1e-3 * np.sin(np.linspace(0, np.pi, made.clip.frames))[None, :, None] * np.array([1.0, 0.5, 0.0])
+    moved = made.clip.moved + response * made.clip.seen[..., None]
+    case = replace(case, clip=replace(case.clip, moved=moved))
+    x, aside = fitting.without(case, response, lambda text: None)
+    assert (np.abs(x[:3] - made.base.x) < 2.5 * made.base.spread).all()
+    assert len(x) == 4
+    assert aside.shape == (3,)
+
+
+def test_numbers_that_carry_moments_of_release_let_go_then():
+    case = plain()
+    clip, later = case.clip, np.append(case.base.x, case.clip.opening[0, 17] + 1.0)
+    opened = clip.opens(later[3:])
+    assert opened.opening[0, 17] == later[3]
+    assert clip.opens(np.zeros(0)) is clip
+    run = based(case, later).simulated
+    assert run == pytest.approx(based(replace(case, clip=opened), case.base.x).simulated, abs=1e-9)
+    assert np.abs(run - case.base.simulated)[:, 18:20].max() > 1e-4
 
 
 @pytest.fixture(scope="module")
