@@ -18,6 +18,7 @@ from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.noise import Noise, whitener
 from surgisim.diagnosis.ring_down import LATE, LATEST
 from surgisim.estimation.trial import at_once
+from surgisim.mpm.grip import runs
 from surgisim.mpm.simulator import Breakdown
 from surgisim.problem import Problem
 
@@ -40,7 +41,7 @@ RADIUS, HERE, CENTRE, PATH = 0.1, 1.0, 5e-4, 1e-4
 moment to moment [m]."""
 SOON = 0.2
 """Of the moment of a release whose frames were fitted, about what came out [frames]: there tracks bend with it."""
-LAWS = ("corotated",)
+LAWS = ("corotated", "neo_hookean")
 """Elastic laws that tissue may follow instead of the base's; a standard deviation is the whole way to each."""
 FAR_OFF = 0.8e-3
 """Beyond which what is held is laid anew [m]."""
@@ -79,7 +80,7 @@ def of_laws(
 ) -> list[Group]:
     """What laws are fitted with: the same, and grips, held tissue and elastic laws that may be others."""
     near, moved = base.tangent, HELD * by_held(clip, base.x, base.simulated, memo)
-    groups = [*other_bodies(clip, base, memo, workers), firmness(clip, near), path(clip, near)]
+    groups = [*other_bodies(clip, base, memo, workers), firmness(clip, near), path(clip, near), closing(clip, near)]
     if moved.any():
         groups.append(Group("held", moved[None], (("where what is held ends", HELD, "m"),)))
     return of_base(clip, base.simulated, error, drift, settings) + chosen(groups, settings)
@@ -205,7 +206,7 @@ def held(clip: Clip) -> np.ndarray:
 
 def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group]:
     """Grips of another size or place, or that open sooner, and tissue of another elastic law, by the engine."""
-    motion, runs = clip.motion, []
+    motion, trials = clip.motion, []
     u, v = plane(clip)
     for j in range(len(motion.radius)):
         if not motion.active[j].any():
@@ -213,28 +214,28 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
         one = np.eye(len(motion.radius))[j]
         shown = motion.active[j, : clip.until].any()
         larger = replace(motion, radius=motion.radius * (1 + RADIUS * one))
-        runs.append(("grip radius", (f"radius of grip {j}", RADIUS, "1"), larger, None))
+        trials.append(("grip radius", (f"radius of grip {j}", RADIUS, "1"), larger, None))
         for axis, way in (("u", u), ("v", v)) if shown else ():
             by = CENTRE * one[:, None] * way
             aside = replace(motion, center_rest=motion.center_rest + by, position=motion.position + by[:, None])
-            runs.append(("grip centre", (f"centre of grip {j} along {axis}", CENTRE, "m"), aside, None))
+            trials.append(("grip centre", (f"centre of grip {j} along {axis}", CENTRE, "m"), aside, None))
     for j in np.flatnonzero(motion.active.any(1) & ~motion.active[:, : clip.until].any(1)):
         # Of grips that fitted frames show, the tangent says it (`firmness`).
         way = np.eye(len(motion.radius))[j][:, None, None] * (motion.position - motion.center_rest[:, None])
         further = replace(motion, position=motion.position + FIRM * way)
-        runs.append(("grip firmness", (f"firmness of grip {j}", FIRM, "1"), further, None))
-    runs = [
+        trials.append(("grip firmness", (f"firmness of grip {j}", FIRM, "1"), further, None))
+    trials = [
         (name, told, replace(clip, recording=replace(clip.recording, motion=m)), terms, 1.0)
-        for name, told, m, terms in runs
+        for name, told, m, terms in trials
     ]
-    runs += [("elastic law", (name, 1.0, "1"), clip, (name, "newtonian"), 1.0) for name in LAWS]
+    trials += [("elastic law", (name, 1.0, "1"), clip, (name, "newtonian"), 1.0) for name in LAWS]
     for j, last in clip.releases(clip.frames - 1):
         known = last < clip.until - 3
         sd, by = (SOON if known else LATE), (-0.25 if clip.opening[j, last] > LATEST - 0.25 else 0.25)
         late = clip.opening.copy()
         late[j, last] += by
         when = (release(j, last), sd / clip.fps, "s")
-        runs.append(("release", when, replace(clip, late=late), None, sd / by))
+        trials.append(("release", when, replace(clip, late=late), None, sd / by))
 
     def moved(run, _worker: int) -> np.ndarray | None:
         _, _, other, terms, times = run
@@ -244,7 +245,7 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
             return None
 
     groups: dict[str, Group] = {}
-    for (name, told, *_), change in zip(runs, at_once(moved, runs, workers), strict=True):
+    for (name, told, *_), change in zip(trials, at_once(moved, trials, workers), strict=True):
         if change is not None:
             before = groups.get(name, Group(name, np.zeros((0, *change.shape))))
             groups[name] = Group(name, np.concatenate([before.columns, change[None]]), (*before.values, told))
@@ -300,6 +301,20 @@ def path(clip: Clip, near) -> Group:
             courses = [bump * active for bump in hats(clip) if (bump * active).any()]
             result += [PATH * parts[d] * course[None, :, None] for course in courses for d in range(3)]
     return Group("grip path", _to_the_end(result, clip))
+
+
+def closing(clip: Clip, near) -> Group:
+    """Grips that close sooner or later than their first frame: what they carry is ahead or behind by that much path."""
+    result, values = [], []
+    for j, on in enumerate(clip.motion.active[:, : clip.until]):
+        parts = _carried(clip, near, j) if on.any() else None
+        for first, last in runs(on):
+            step = clip.motion.position[j, min(first + 1, last)] - clip.motion.position[j, first]
+            if step.any():
+                holds = (np.arange(clip.until) >= first) & (np.arange(clip.until) <= last)
+                result.append(LATE * np.einsum("dkti,d->kti", parts, step) * holds[None, :, None])
+                values.append((f"closing of grip {j} at frame {first}", LATE / clip.fps, "s"))
+    return Group("closing", _to_the_end(result, clip), tuple(values))
 
 
 def _carried(clip: Clip, near, j: int) -> np.ndarray:

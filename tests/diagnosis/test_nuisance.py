@@ -17,7 +17,7 @@ from surgisim.diagnosis.self_consistency import drawn
 
 NAMES = (
     "release", "held", "lag", "scale", "drift", "simulator", "grip radius", "grip centre", "grip firmness", "grip path",
-    "elastic law",
+    "elastic law", "closing",
 )  # fmt: skip
 DIRECTIONS, DRAWS = 300, 12
 
