@@ -9,12 +9,12 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration
 from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
-from surgisim.diagnosis.flexible import Flexible, flexible
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener
 from surgisim.diagnosis.nuisance import Group, positions, release
 from surgisim.diagnosis.prospect import Prospect, prospect
+from surgisim.diagnosis.saturated import Saturated, SmoothFit, saturated
 
 ON_A_GPU = 8
 """Runs side by side there: their steps take hardly longer than one's."""
@@ -54,9 +54,14 @@ class Case:
         return metric(np.delete(self.space.columns, [*range(*self.slopes.indices(10**9)), *searched], axis=1))
 
     @cached_property
-    def flexible(self) -> Flexible:
+    def saturated(self) -> Saturated:
         """What any smooth residual could gain."""
-        return flexible(self.clip, self.whiten, self.space, self.nulls)
+        return saturated(self.clip, self.whiten, self.space, self.nulls)
+
+    @cached_property
+    def smooth(self) -> SmoothFit:
+        """What it gains on the base's residual."""
+        return self.saturated.fit(self.z)
 
     @cached_property
     def nuisance_ratio(self) -> float:

@@ -16,7 +16,7 @@ from surgisim.diagnosis.candidates import Parts, blocks, costly, finer
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.context import Case, workers
 from surgisim.diagnosis.evidence import Finding, Score, Scores, by_law, highest, judge
-from surgisim.diagnosis.flexible import Bend
+from surgisim.diagnosis.joint import Joint, fit_jointly, needed
 from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
 from surgisim.diagnosis.locate import worst
 from surgisim.diagnosis.memo import Memo
@@ -24,7 +24,6 @@ from surgisim.diagnosis.metric import metric
 from surgisim.diagnosis.noise import Whitener, estimate, whitener
 from surgisim.diagnosis.nuisance import Group
 from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
-from surgisim.diagnosis.together import Together, needed, together
 from surgisim.estimation.trial import at_once
 from surgisim.mpm.simulator import Breakdown
 from surgisim.problem import Problem
@@ -51,7 +50,6 @@ def diagnose(
         case, findings = first_look(recording, finer, memo.on(finer.grid), again)
     clip, settings, memo = case.clip, case.settings, case.memo
     laws = by_law(findings)
-    bend = case.flexible.fit(case.z)
     detected = case.overstretched or max(score.evidence for score in laws.values()) > threshold(laws, settings)
     if detected:
         parts = costly(clip, case.base, memo, case.workers)
@@ -62,8 +60,8 @@ def diagnose(
         case, refits = compete(case, laws, ranked, progress)
     fitted = None
     if detected:
-        refits, fitted = explained_by(case, refits, bend, progress)
-    return verdict.write(case, laws, ranked, refits, fitted, bend, lambda text: progress(0.97, 1, text))
+        refits, fitted = explained_by(case, refits, progress)
+    return verdict.write(case, laws, ranked, refits, fitted, lambda text: progress(0.97, 1, text))
 
 
 def compete(case: Case, laws: Scores, ranked: list[str], progress: Progress) -> tuple[Case, list[Refit]]:
@@ -216,13 +214,13 @@ def sharpened(case: Case, law: Score, z: np.ndarray) -> tuple[Finding, float]:
     return best, law.evidence + 0.5 * (best.gain - law.best.gain)
 
 
-def explained_by(case: Case, refits: list[Refit], bend: Bend, progress: Progress) -> tuple[list, Together]:
+def explained_by(case: Case, refits: list[Refit], progress: Progress) -> tuple[list, Joint]:
     """What may be named: the best law, or two that fit clearly better together; and the laws, the named one first."""
     settings = case.settings
     free = settings.free > 0 and 2 * fit_of_a_law(case) < settings.budget
 
-    def fit(laws: list[Refit]) -> Together:
-        return together(case, laws, lambda text: progress(0.93, 1, text), free=free)
+    def fit(laws: list[Refit]) -> Joint:
+        return fit_jointly(case, laws, lambda text: progress(0.93, 1, text), free=free)
 
     one = fit(refits[:1])
     if not settings.second:
@@ -230,7 +228,7 @@ def explained_by(case: Case, refits: list[Refit], bend: Bend, progress: Progress
     pairs: dict[frozenset, list[Refit]] = {}
     firsts = [r for r in refits[:FIRSTS] if r.gain > calibration.CLOSE * refits[0].gain]
     progress(0.86, 1, f"what {' and '.join(r.term for r in firsts)} leave{'s' if len(firsts) == 1 else ''}")
-    seconds = at_once(lambda first, _: another(case, first, bend), firsts, case.workers)
+    seconds = at_once(lambda first, _: another(case, first), firsts, case.workers)
     for first, second in zip(firsts, seconds, strict=True):
         if second is not None:
             terms = frozenset((first.term, second.term))
@@ -238,7 +236,7 @@ def explained_by(case: Case, refits: list[Refit], bend: Bend, progress: Progress
     order = sorted(pairs.values(), key=promise, reverse=True)
     tried = [fit(pair) for pair in order if promise(pair) > calibration.RUNNER_UP * promise(order[0])]
     both = max(tried, key=lambda t: t.gain, default=None)
-    if both is None or not judgement.pays(case, bend, one, both):
+    if both is None or not judgement.pays(case, one, both):
         return refits, replace(one, beside=both)
     said = needed(case, both)
     # Beside its second, the first is as evident as the two are together.
@@ -251,10 +249,10 @@ def promise(pair: list[Refit]) -> float:
     return sum(r.gain for r in pair)
 
 
-def another(case: Case, first: Refit, bend: Bend) -> Refit | None:
+def another(case: Case, first: Refit) -> Refit | None:
     """The second effect that pays most once the first is there; None where none may do."""
     until = case.clip.until
-    if judgement.still(case, bend, case.base.simulated + first.response) <= calibration.LITTLE_LEFT:
+    if judgement.still(case, case.base.simulated + first.response) <= calibration.LITTLE_LEFT:
         return None
     white = case.whiten(first.response[:, :until])
     # The first law's strength is open again: its signature joins the nuisances.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from surgisim.diagnosis.flexible import smooth_part
+from surgisim.diagnosis.saturated import smooth_part
 
 LEAST = 3
 """Frames of rest that a point's constant is told from; seen in fewer, it is told from all that may be fitted."""

@@ -16,12 +16,12 @@ from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.context import Case
 from surgisim.diagnosis.errors import bootstrap, residual, rms
 from surgisim.diagnosis.evidence import Scores
-from surgisim.diagnosis.flexible import Bend
 from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.joint import Joint, least, prediction
 from surgisim.diagnosis.noise import Noise, estimate
 from surgisim.diagnosis.prospect import Gain
 from surgisim.diagnosis.refit import Refit
-from surgisim.diagnosis.together import Together, least, prediction
+from surgisim.diagnosis.saturated import SmoothFit
 
 REASONS = ("named", "faint", "loose", "drawn", "little", "unconfirmed", "refuted", "beaten")
 
@@ -30,7 +30,7 @@ REASONS = ("named", "faint", "loose", "drawn", "little", "unconfirmed", "refuted
 class Explanation:
     """Laws that may be named."""
 
-    fitted: Together
+    fitted: Joint
     log_evidence: float
     """Of the frames that were fitted."""
     ahead: Gain | None
@@ -110,25 +110,25 @@ class Judgement:
         return [] if self.chosen is None else self.chosen.fitted.refits
 
 
-def explanations(case: Case, refits: list[Refit], fitted: Together, bend: Bend) -> list[Explanation]:
+def explanations(case: Case, refits: list[Refit], fitted: Joint) -> list[Explanation]:
     """What may be named, most supported first. fitted: the best law, or two that pay together; refits: all."""
     singles = [r for r in refits if r.response.any() and r is not fitted.refits[0]]
     tried = [fitted, *(prediction(case, [r], case.base.simulated + r.response, r.x) for r in singles)]
     if len(fitted.refits) == 1:
         tried = [t for t in tried if t is fitted or t.refits[0].term != fitted.refits[0].term]
-    return sorted((_explanation(case, t, bend) for t in tried), key=lambda e: -e.support)
+    return sorted((_explanation(case, t) for t in tried), key=lambda e: -e.support)
 
 
-def _explanation(case: Case, fitted: Together, bend: Bend) -> Explanation:
+def _explanation(case: Case, fitted: Joint) -> Explanation:
     ahead = None if case.prospect is None else case.prospect.gain(case.base.simulated, fitted.moved)
     out = max((out for out, _ in pushes(case.clip.recording, fitted.refits)), default=None)
     low, _ = bootstrap(case, case.base.simulated, fitted.moved)
     falls = low is not None and low > 0
-    return Explanation(fitted, fitted.refits[0].log_evidence, ahead, still(case, bend, fitted.moved), out, falls)
+    return Explanation(fitted, fitted.refits[0].log_evidence, ahead, still(case, fitted.moved), out, falls)
 
 
 def judged(
-    case: Case, laws: Scores, tried: list[Explanation], bend: Bend, over: Gain | None = None, worse: bool = False
+    case: Case, laws: Scores, tried: list[Explanation], over: Gain | None = None, worse: bool = False
 ) -> Judgement:
     """Where something is detected.
 
@@ -137,7 +137,7 @@ def judged(
     chances = probabilities(laws, tried)
     chosen = simplest(case, stands(tried), tried, chances)
     fitted, term = chosen.fitted, chosen.first.term
-    total = max(explainable(bend), fitted.gain, 1e-9)
+    total = max(explainable(case.smooth), fitted.gain, 1e-9)
     explained = float(np.clip(fitted.gain / total, 0, 1))
     noise = noise_beside(case, fitted.moved)
     took = taken(case, fitted.moved, noise.sigma)
@@ -261,22 +261,22 @@ def pushes(recording, accepted: list[Refit]) -> list[tuple[float, Hypothesis]]:
     return [(outward(recording, h.place, amplitude), h) for h, amplitude in found]
 
 
-def pays(case: Case, bend: Bend, one: Together, both: Together) -> bool:
+def pays(case: Case, one: Joint, both: Joint) -> bool:
     """Whether a second law fitted together with the first says enough to be named beside it."""
-    rest, left = (still(case, bend, t.moved) for t in (one, both))
+    rest, left = (still(case, t.moved) for t in (one, both))
     return left < (1 - calibration.SECOND) * rest and 0.5 * (both.gain - one.gain) > least(one)
 
 
-def still(case: Case, bend: Bend, after: np.ndarray) -> float:
+def still(case: Case, after: np.ndarray) -> float:
     """Share of what a smooth field could explain that is left beside a prediction."""
     clip = case.clip
     z = case.z - case.whiten(after[:, : clip.until] - case.base.simulated[:, : clip.until])
-    return float(np.clip(explainable(case.flexible.fit(z)) / max(explainable(bend), 1e-9), 0, 1))
+    return float(np.clip(explainable(case.saturated.fit(z)) / max(explainable(case.smooth), 1e-9), 0, 1))
 
 
-def explainable(bend: Bend) -> float:
+def explainable(smooth: SmoothFit) -> float:
     """chi square that a smooth field gains beyond what it gains on nearly all residuals of nothing."""
-    return max(bend.gain - bend.slack, 0.0)
+    return max(smooth.gain - smooth.slack, 0.0)
 
 
 def cos(case: Case, a: Refit, b: Refit) -> float:

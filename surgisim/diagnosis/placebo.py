@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from surgisim.diagnosis.evidence import Finding
+from surgisim.diagnosis.joint import Joint, based, prediction
 from surgisim.diagnosis.laws import IMPOSSIBLE
 from surgisim.diagnosis.metric import metric
 from surgisim.diagnosis.refit import Refit, refit
-from surgisim.diagnosis.together import Together, based, prediction
 
 AWAY = 0.012
 """From where a law was found, that the same law is at a wrong place [m]."""
@@ -18,7 +18,7 @@ LIKE = 2
 """Best laws that are no placebos: the second may stand for the first."""
 
 
-def placebo(case, named: Together, refits: list[Refit], laws: dict) -> Together | None:
+def placebo(case, named: Joint, refits: list[Refit], laws: dict) -> Joint | None:
     """Of a `diagnose.Case`: the wrong law that fits best, its strength fitted in the engine. None where none acts.
 
     It acts in the base that was fitted with what is named. With a base of its own, one that does nothing in held-out
@@ -37,7 +37,7 @@ def placebo(case, named: Together, refits: list[Refit], laws: dict) -> Together 
     return None
 
 
-def wrong(named: Together, refits: list[Refit], laws: dict) -> list[Finding]:
+def wrong(named: Joint, refits: list[Refit], laws: dict) -> list[Finding]:
     """The best law at other places where it has one, otherwise laws of as few numbers that nobody would name."""
     best = refits[0].finding.hypothesis
     if best.place is not None:

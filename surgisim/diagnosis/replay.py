@@ -11,8 +11,8 @@ import numpy as np
 
 from surgisim.diagnosis.base import carried, simulate
 from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.joint import Joint
 from surgisim.diagnosis.laws import IMPOSSIBLE, Clash, joined, law_of, respond
-from surgisim.diagnosis.together import Together
 from surgisim.estimation.trial import at_once
 
 
@@ -27,7 +27,7 @@ class Replay:
     placebo: np.ndarray | None
 
 
-def replayed(case, named: Together, placebo: Together | None) -> Replay | None:
+def replayed(case, named: Joint, placebo: Joint | None) -> Replay | None:
     """The three predictions of a `diagnose.Case`.
 
     None where the grid would not be finer, or where the engine breaks down on it.
@@ -43,7 +43,7 @@ def replayed(case, named: Together, placebo: Together | None) -> Replay | None:
         _, run = simulate(prepared, clip, x, memo, clip.frames)
         return carried(prepared.simulator.carry(clip.rest), run)
 
-    def moved(what: Together) -> np.ndarray:
+    def moved(what: Joint) -> np.ndarray:
         base = replace(case.base, x=what.x)
         laws = [law_of(r.finding.hypothesis, r.amplitude, clip) for r in what.refits]
         try:

@@ -15,6 +15,7 @@ from surgisim.diagnosis.errors import errors, residual, rms
 from surgisim.diagnosis.evidence import highest
 from surgisim.diagnosis.experiment import separating
 from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.joint import Joint
 from surgisim.diagnosis.judgement import (
     Judgement,
     cos,
@@ -33,20 +34,19 @@ from surgisim.diagnosis.markers import largest, markers
 from surgisim.diagnosis.model import base_numbers, physics
 from surgisim.diagnosis.placebo import placebo
 from surgisim.diagnosis.replay import Replay, replayed
-from surgisim.diagnosis.together import Together
 
 RUNNERS = 4
 """Other laws that an effect lists."""
 
 
 def write(
-    case, laws, ranked, refits, fitted: Together | None, bend, say: Callable[[str], None]
+    case, laws, ranked, refits, fitted: Joint | None, say: Callable[[str], None]
 ) -> tuple[Diagnosis, Physics, Mismatch]:
     """Everything a diagnosis leaves behind. refits: best first; fitted: of them what may be named, None for nothing."""
     clip, base = case.clip, case.base
     rng = np.random.default_rng([case.settings.seed, 1])
-    tried = [] if fitted is None else explanations(case, refits, fitted, bend)
-    said_of = judged(case, laws, tried, bend) if tried else nothing(case, laws)
+    tried = [] if fitted is None else explanations(case, refits, fitted)
+    said_of = judged(case, laws, tried) if tried else nothing(case, laws)
     shown = Replay(clip, base.simulated, said_of.after, None)
     if said_of.chosen is not None:
         refits, fitted = reordered(refits, said_of.chosen), said_of.chosen.fitted
@@ -55,7 +55,7 @@ def write(
         wrong = placebo(case, fitted, refits, laws)
         over = None if wrong is None or case.prospect is None else case.prospect.gain(wrong.moved, fitted.moved)
         shown = beside_placebo(case, fitted, wrong)
-        said_of = judged(case, laws, tried, bend, over, worse(case, shown))
+        said_of = judged(case, laws, tried, over, worse(case, shown))
         if not said_of.named:
             shown = replace(shown, after=shown.before, placebo=None)
     verdict, chances, named = said_of.verdict, said_of.chances, said_of.named
@@ -101,11 +101,11 @@ def write(
         global_test={
             "log_evidence": float(laws[ranked[0]].evidence),
             "nulls": np.round(highest(laws), 3).tolist(),
-            "explainable": float(explainable(bend)),
+            "explainable": float(explainable(case.smooth)),
             "nuisance_ratio": case.nuisance_ratio,
             **_shares(said_of),
             "spacing": {"value": float(1e3 * shown.clip.body.spacing), "unit": "mm"},
-            "beside": None if fitted is None or fitted.beside is None else _beside(case, bend, fitted.beside),
+            "beside": None if fitted is None or fitted.beside is None else _beside(case, fitted.beside),
         },
     )
     mismatch = Mismatch(
@@ -139,7 +139,7 @@ def _shares(said_of: Judgement) -> dict:
     return told | {"gain": chosen.fitted.gain, "left": chosen.left, "outward": chosen.outward, "held_out": ahead}
 
 
-def beside_placebo(case, fitted: Together, wrong: Together | None) -> Replay:
+def beside_placebo(case, fitted: Joint, wrong: Joint | None) -> Replay:
     """What is shown of what is named: on a finer grid, where the engine bears it."""
     as_searched = Replay(case.clip, case.base.simulated, fitted.moved, None if wrong is None else wrong.moved)
     return replayed(case, fitted, wrong) or as_searched
@@ -184,11 +184,11 @@ def _effect(case: Case, r, chances, named: set[str]) -> dict:
     }
 
 
-def _beside(case, bend, other: Together) -> dict:
+def _beside(case, other: Joint) -> dict:
     return {
         "laws": [r.term for r in other.refits],
         "gain": other.gain,
-        "left": still(case, bend, other.moved),
+        "left": still(case, other.moved),
         "held_out_rms": rms(case, other.moved)[1],
     }
 

@@ -14,8 +14,8 @@ from surgisim.diagnosis.base import START, TERMS
 from surgisim.diagnosis.calibration import TEMPERATURE
 from surgisim.diagnosis.clip import OPENS, clip_of
 from surgisim.diagnosis.diagnose import prepare_case
+from surgisim.diagnosis.joint import based
 from surgisim.diagnosis.memo import Memo
-from surgisim.diagnosis.together import based
 from surgisim.mpm.simulator import Breakdown
 
 QUICK = 50.0

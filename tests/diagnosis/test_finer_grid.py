@@ -14,11 +14,11 @@ from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.diagnose import hazy
 from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.joint import prediction
 from surgisim.diagnosis.laws import law_of, respond
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.refit import Refit
 from surgisim.diagnosis.replay import replayed
-from surgisim.diagnosis.together import prediction
 
 FINE, WEIGHT = 0.18, np.array([8.0, 0.0, 0.0])
 

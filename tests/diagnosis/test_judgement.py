@@ -10,10 +10,10 @@ from surgisim.diagnosis import judgement
 from surgisim.diagnosis.calibration import CLEAR, PULLS, PUSH_LEAVES, THRESHOLD
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.joint import Joint
 from surgisim.diagnosis.judgement import Explanation, stands
 from surgisim.diagnosis.prospect import Gain
 from surgisim.diagnosis.refit import Refit
-from surgisim.diagnosis.together import Together
 from surgisim.physics.place import Place
 
 BETTER, WORSE, ALIKE, BLIND = (
@@ -30,7 +30,7 @@ def explanation(term="gravity", evidence=90.0, ahead=BETTER, left=0.05, out=None
         Hypothesis(term, np.eye(3), 0, place), evidence, np.ones(3), np.ones(3), 100.0, np.zeros(1), 0, 1e-4
     )
     one = Refit(finding, np.ones(3), np.zeros((1, 1, 3)), 100.0, evidence)
-    return Explanation(Together([one], np.zeros((1, 1, 3)), 100.0, np.zeros(3)), evidence, ahead, left, out)
+    return Explanation(Joint([one], np.zeros((1, 1, 3)), 100.0, np.zeros(3)), evidence, ahead, left, out)
 
 
 def reason(chosen: Explanation, chance=0.9, explained=0.9, took=0.9, over=None, case=CASE) -> str:
@@ -91,7 +91,7 @@ def two(more: int, chance: float, cos: float) -> tuple[Explanation, list[Explana
     same = Hypothesis("added_mass", np.eye(3)[:, :more], 1, h.place)
     finding = Finding(same, 90.0, np.ones(more), np.ones(more), 100.0, np.zeros(1), 0, 1e-4)
     one = Refit(finding, np.ones(more), np.zeros((1, 1, 3)), 100.0, 90.0)
-    fewer = Explanation(Together([one], np.zeros((1, 1, 3)), 100.0, np.zeros(3)), 90.0, BETTER, 0.05, None)
+    fewer = Explanation(Joint([one], np.zeros((1, 1, 3)), 100.0, np.zeros(3)), 90.0, BETTER, 0.05, None)
     return freer, [freer, fewer], {"hidden_contact": 1 - chance, "added_mass": chance}
 
 

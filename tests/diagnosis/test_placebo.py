@@ -8,9 +8,9 @@ from planted import tilted
 
 from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.joint import Joint
 from surgisim.diagnosis.placebo import held, placebo, wrong
 from surgisim.diagnosis.refit import Refit
-from surgisim.diagnosis.together import Together
 from surgisim.physics.place import Place
 
 MOVED = np.array([0.0, 0.01, 0.3])
@@ -31,9 +31,9 @@ def score(evidence: float, *findings: Finding) -> Score:
     return Score(evidence, np.zeros(1), list(findings))
 
 
-def named(case, one: Finding) -> Together:
+def named(case, one: Finding) -> Joint:
     response = np.zeros_like(case.base.simulated)
-    return Together([Refit(one, one.amplitude, response, 40.0, 20.0)], response, 40.0, case.base.x + MOVED)
+    return Joint([Refit(one, one.amplitude, response, 40.0, 20.0)], response, 40.0, case.base.x + MOVED)
 
 
 def test_it_has_the_body_of_what_is_named(case):

@@ -53,8 +53,8 @@ def test_a_change_of_weight_is_named(leaning):
 def test_a_law_that_its_placebo_beats_on_held_out_frames_is_neither_named_nor_modelled(monkeypatch):
     judged = judging.judged
 
-    def beaten(case, laws, tried, bend, over=None, worse=False):
-        return judged(case, laws, tried, bend, None if over is None else WORSE, worse)
+    def beaten(case, laws, tried, over=None, worse=False):
+        return judged(case, laws, tried, None if over is None else WORSE, worse)
 
     monkeypatch.setattr(judging, "judged", beaten)
     found, physics, _ = verdict(values=TILT)

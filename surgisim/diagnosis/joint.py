@@ -12,7 +12,7 @@ from surgisim.diagnosis.refine import refined
 
 
 @dataclass(frozen=True)
-class Together:
+class Joint:
     refits: list
     """Best first, with the numbers that they have beside one another; a response stays that of its law alone."""
     moved: np.ndarray
@@ -21,7 +21,7 @@ class Together:
     """Of chi square over the base alone."""
     x: np.ndarray
     """The base that goes with them, and its moments of release, (3 + R,)."""
-    beside: "Together | None" = None
+    beside: "Joint | None" = None
     """What else was fitted: one law instead of two, or the other way round."""
 
 
@@ -33,16 +33,16 @@ def based(case, x: np.ndarray) -> Base:
     return replace(base, x=x, drive=drive, run=run, simulated=simulated)
 
 
-def prediction(case, refits: list, moved: np.ndarray, x: np.ndarray | None) -> Together:
+def prediction(case, refits: list, moved: np.ndarray, x: np.ndarray | None) -> Joint:
     """With its gain; x None where the base stays."""
     until = case.clip.until
     left = case.z - case.whiten(moved[:, :until] - case.base.simulated[:, :until])
     both = np.stack([case.z, left], 1)
     before, after = np.diag(case.space.gram(both, both))
-    return Together(refits, moved, float(before - after), case.base.x if x is None else x)
+    return Joint(refits, moved, float(before - after), case.base.x if x is None else x)
 
 
-def together(case, refits: list, say: Callable[[str], None], *, free: bool) -> Together:
+def fit_jointly(case, refits: list, say: Callable[[str], None], *, free: bool) -> Joint:
     """One law as it was fitted; two fitted anew with all numbers of both and the base free, where `free`.
 
     Where that cannot be, because both need the same term, the base moves to where the metric puts it once the laws'
@@ -59,7 +59,7 @@ def together(case, refits: list, say: Callable[[str], None], *, free: bool) -> T
     return max(tried, key=lambda t: t.gain)
 
 
-def needed(case, both: Together) -> Together:
+def needed(case, both: Joint) -> Joint:
     """Two laws fitted together, or one of them alone where the other says nothing beside it.
 
     The one found first may have stood for the other: beside it, it comes out as next to nothing. The law that stays
@@ -72,12 +72,12 @@ def needed(case, both: Together) -> Together:
     return best
 
 
-def least(one: Together) -> float:
+def least(one: Joint) -> float:
     """log evidence that a law must add beside `one`: what its signature has wrong must not pass for another law."""
     return calibration.THRESHOLD + calibration.FITTED_MISFIT * one.gain
 
 
-def _alone(case, both: Together, kept) -> list[Together]:
+def _alone(case, both: Joint, kept) -> list[Joint]:
     """One of two laws with the numbers and the base that it has beside the other; none where the engine breaks down."""
     try:
         moved = respond(
@@ -93,7 +93,7 @@ def _alone(case, both: Together, kept) -> list[Together]:
     return [replace(found, refits=[mine])]
 
 
-def _freed(case, refits: list, say) -> list[Together]:
+def _freed(case, refits: list, say) -> list[Joint]:
     starts = [(r.finding.hypothesis, r.amplitude) for r in refits]
     try:
         joined([law_of(*start, case.clip) for start in starts])
@@ -117,7 +117,7 @@ def _freed(case, refits: list, say) -> list[Together]:
     return [prediction(case, mine, case.base.simulated + found.response, found.x)]
 
 
-def _moved(case, refits: list) -> list[Together]:
+def _moved(case, refits: list) -> list[Joint]:
     clip, base, until, first = case.clip, case.base, case.clip.until, refits[0].x
     left = case.z - sum(case.whiten(r.response[:, :until]) for r in refits)
     likely = case.space.likely(left)[case.slopes]

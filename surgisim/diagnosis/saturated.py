@@ -1,4 +1,4 @@
-"""The most that any smooth residual could gain: a yardstick that names nothing."""
+"""The saturated model: the most that any smooth residual could gain, a yardstick that names nothing."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ SIZE = 6e-4
 
 
 @dataclass(frozen=True)
-class Bend:
+class SmoothFit:
     """A smooth field, fitted."""
 
     gain: float
@@ -31,7 +31,7 @@ class Bend:
 
 
 @dataclass(frozen=True)
-class Flexible:
+class Saturated:
     """Smooth fields, each coefficient with the same modest prior."""
 
     field: np.ndarray
@@ -45,24 +45,24 @@ class Flexible:
     slack: float
     """What all but 5 % of the nulls gain, beyond that."""
 
-    def fit(self, z: np.ndarray) -> Bend:
+    def fit(self, z: np.ndarray) -> SmoothFit:
         """To a whitened residual (N,)."""
         shadow = (self.cleared.T @ z.astype(np.float32)).astype(float)[:, None]
         x, gains = _fitted(self.gram, shadow)
         parts = x.reshape(3, len(self.field))
-        return Bend(
+        return SmoothFit(
             float(gains[0]) - self.by_chance, np.einsum("em,mkt->kte", parts, self.field, optimize=True), self.slack
         )
 
 
-def flexible(clip: Clip, whiten: Whitener, space: Metric, nulls: np.ndarray) -> Flexible:
+def saturated(clip: Clip, whiten: Whitener, space: Metric, nulls: np.ndarray) -> Saturated:
     """The fields of a clip; nulls: residuals of nothing, (N, D)."""
     field = np.einsum("km,bt->mbkt", _patterns(clip), _courses(clip.until)).reshape(-1, len(clip.rest), clip.until)
     white = whiten(np.concatenate([field[..., None] * e for e in np.eye(3)])).T.astype(np.float32)
     gram, cleared = space.gram(white, white), space.cleared(white)
     _, gains = _fitted(gram, (cleared.T @ nulls.astype(np.float32)).astype(float))
     by_chance = float(gains.mean())
-    return Flexible(field, cleared, gram, by_chance, float(np.quantile(gains, 0.95)) - by_chance)
+    return Saturated(field, cleared, gram, by_chance, float(np.quantile(gains, 0.95)) - by_chance)
 
 
 def _fitted(gram: np.ndarray, shadow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

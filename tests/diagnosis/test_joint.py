@@ -7,9 +7,9 @@ from planted import case_of, recording
 from surgisim.diagnosis import calibration, judgement
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.joint import Joint, fit_jointly, needed, prediction
 from surgisim.diagnosis.laws import joined, law_of, respond
 from surgisim.diagnosis.refit import Refit
-from surgisim.diagnosis.together import Together, needed, prediction, together
 
 WEIGHT, AXIS, TURN = np.array([6.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), 0.25
 
@@ -36,8 +36,8 @@ def test_laws_that_are_fitted_together_do_not_make_up_for_each_other(case):
         case, Hypothesis("fibre", np.eye(1), 1, None, None, None, {"k2": 0.5, "axis": off}), np.array([1.5e3])
     )
     said = []
-    apart = together(case, [weight, strand], said.append, free=False)
-    both = together(case, [weight, strand], said.append, free=True)
+    apart = fit_jointly(case, [weight, strand], said.append, free=False)
+    both = fit_jointly(case, [weight, strand], said.append, free=True)
     assert both.gain > apart.gain
     assert both.refits[0].amplitude == pytest.approx(WEIGHT, abs=1.5)
     assert abs(both.refits[1].finding.hypothesis.about["axis"] @ AXIS) > np.cos(0.5 * TURN)
@@ -74,7 +74,7 @@ def test_a_law_that_came_out_as_nothing_is_dropped_and_one_that_says_something_i
     ("gain", "left", "said"), [(400.0, 0.1, True), (400.0, 0.3, False), (260.0, 0.1, False), (200.0, 0.4, False)]
 )
 def test_a_second_law_is_named_for_what_both_explain_together(monkeypatch, gain, left, said):
-    one, both = (Together([], np.array(x), g, np.zeros(3)) for x, g in ((0.4, 200.0), (left, gain)))
-    monkeypatch.setattr(judgement, "still", lambda case, bend, moved: float(moved))
+    one, both = (Joint([], np.array(x), g, np.zeros(3)) for x, g in ((0.4, 200.0), (left, gain)))
+    monkeypatch.setattr(judgement, "still", lambda case, moved: float(moved))
     # Half of what is left has to go, and half the gain must exceed 25 + 3 % of 200.
-    assert judgement.pays(None, None, one, both) is said
+    assert judgement.pays(None, one, both) is said
