@@ -99,7 +99,40 @@ def first_look(
     clip = clip_of(recording, share=settings.grid, device=settings.device)
     progress(0.01, 1, f"noise of {len(clip.kept)} points on {clip.until} frames")
     case = prepare_case(clip, settings, memo, progress)
-    return case, search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.39 * s, 1, text))
+
+    def searched(case: Case) -> list[Finding]:
+        return search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.39 * s, 1, text))
+
+    findings = searched(case)
+    moved = laid_anew(case, by_law(findings), progress)
+    return (case, findings) if moved is None else (moved, searched(moved))
+
+
+def laid_anew(case: Case, laws: Scores, progress: Progress) -> Case | None:
+    """The case with what is held laid where it seems to end.
+
+    None where that is near its box, or where the best law says more: what is held would make up for a law, and a soft
+    layer at the base for a plane that lies elsewhere.
+    """
+    space, top, rivals = case.space, max(laws, key=lambda term: laws[term].evidence), []
+    if laws[top].evidence > calibration.THRESHOLD:
+        law = refit(case, laws[top].best, laws[top].evidence, case.z)
+        white = case.whiten(law.response[:, : case.clip.until])
+        beside = metric(np.concatenate([space.columns, white[:, None]], 1))
+        rivals.append((nuisance.likely_held(case.groups, beside.likely(case.z - white)), 0.0))
+        rivals.append((nuisance.likely_held(case.groups, space.likely(case.z)), law.gain))
+    else:
+        rivals.append((nuisance.likely_held(case.groups, space.likely(case.z)), 0.0))
+    off, least = next(((off, least) for off, least in rivals if abs(off) > nuisance.FAR_OFF), (0.0, 0.0))
+    if off == 0.0:
+        return None
+    # So far a plane's effect is not in proportion: what is held is laid anew.
+    by = float(np.clip(off, -MOST_HELD, MOST_HELD))
+    try:
+        moved = prepare_case(case.clip.laid(raised=by), case.settings, case.memo, progress, case.base)
+    except (Problem, Breakdown):
+        return None
+    return moved if case.misfit - moved.misfit - (by / HELD) ** 2 > least else None
 
 
 def hazy(case: Case, laws: Scores) -> bool:
@@ -111,8 +144,8 @@ def hazy(case: Case, laws: Scores) -> bool:
     return case.overstretched and max(score.evidence for score in laws.values()) < calibration.CLEAR
 
 
-def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress) -> Case:
-    """Noise, base, nuisances."""
+def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress, begun: Base | None = None) -> Case:
+    """Noise, base, nuisances; begun: a base of nearly the same body."""
     until = clip.until
     fitted = slice(0, until)
     noise = estimate(
@@ -133,32 +166,19 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
         groups = nuisance.of_base(clip, simulated, error, drift, settings)
         return whitened(whiten, groups, until)
 
-    def placed(clip: Clip, begun: Base | None) -> Case:
-        clip, base = fit_base(
-            clip, whiten, beside, memo, workers=workers(clip, settings), timing="release" not in settings.without,
-            begun=begun, say=lambda text: progress(0.1, 1, text),
-        )  # fmt: skip
-        error = nuisance.error_of(clip, base.x, base.simulated, memo, settings)
-        groups = nuisance.of_laws(clip, base, error, drift, memo, settings, workers(clip, settings))
-        fixed = whitened(whiten, groups, until)
-        space = metric(np.concatenate([fixed, whiten(base.slopes).T], 1))
-        slopes = slice(fixed.shape[1], fixed.shape[1] + len(base.slopes))
-        base = settled(clip, whiten, space, slopes, base, memo)
-        z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
-        nulls = space.draw(np.random.default_rng(settings.seed), settings.nulls, whiten.known)
-        return Case(clip, settings, noise, whiten, base, space, memo, z, nulls, slopes, groups, drift)
-
-    case = placed(clip, None)
-    off = nuisance.likely_held(case.groups, case.space.likely(case.z))
-    if abs(off) > nuisance.FAR_OFF:
-        # So far a plane's effect is not in proportion: what is held is laid anew, where it seems to end.
-        try:
-            moved = placed(case.clip.laid(raised=float(np.clip(off, -MOST_HELD, MOST_HELD))), case.base)
-        except (Problem, Breakdown):
-            return case
-        costs = [c.misfit + (c.clip.raised / HELD) ** 2 for c in (case, moved)]
-        case = moved if costs[1] < costs[0] else case
-    return case
+    clip, base = fit_base(
+        clip, whiten, beside, memo, workers=workers(clip, settings), timing="release" not in settings.without,
+        begun=begun, say=lambda text: progress(0.1, 1, text),
+    )  # fmt: skip
+    error = nuisance.error_of(clip, base.x, base.simulated, memo, settings)
+    groups = nuisance.of_laws(clip, base, error, drift, memo, settings, workers(clip, settings))
+    fixed = whitened(whiten, groups, until)
+    space = metric(np.concatenate([fixed, whiten(base.slopes).T], 1))
+    slopes = slice(fixed.shape[1], fixed.shape[1] + len(base.slopes))
+    base = settled(clip, whiten, space, slopes, base, memo)
+    z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
+    nulls = space.draw(np.random.default_rng(settings.seed), settings.nulls, whiten.known)
+    return Case(clip, settings, noise, whiten, base, space, memo, z, nulls, slopes, groups, drift)
 
 
 def whitened(whiten: Whitener, groups: list[Group], until: int) -> np.ndarray:

@@ -210,7 +210,7 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
                 "place": "everywhere"
                 if place is None
                 else {"center": [float(c) for c in place.center], "extent": float(place.extent), "unit": "m"},
-                "log_evidence": float(laws[term].evidence if r is None else r.log_evidence),
+                "log_evidence": float(laws[term].evidence if r is None or not r.response.any() else r.log_evidence),
                 "probability": chances[term],
                 "gain": float(f.gain if r is None else r.gain),
                 "cos": None if r is None else cos(case, refits[0], r),
