@@ -1,6 +1,6 @@
 """The honest base: isotropic elastic tissue with viscosity, in few numbers, and its runs.
 
-Its numbers x are log E, nu and log eta / E, and may be followed by the moments at which grips open (`opened`).
+Its numbers x are log E, nu and log eta / E, and may be followed by the moments at which grips open (`Clip.opens`).
 """
 
 from collections.abc import Callable

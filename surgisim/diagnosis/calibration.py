@@ -35,14 +35,16 @@ RUNNER_UP = 0.9
 FITTED_MISFIT = 0.03
 """Share of the explained chi square that a law still leaves wrong once the engine has fitted it."""
 ALIKE = 0.85
-"""|cos| of whitened signatures beyond which two laws are not told apart."""
+"""|cos| of whitened responses beyond which two laws do the same."""
 NEAR = 0.37
 """Share of a law's probability, one unit of temperature, that a simpler one that does the same may have and be
 preferred: a push that stays and points down is a weight."""
+CREDIBLE = 0.9
+"""Probability that the laws which a verdict names hold together: a single one that has it is named alone."""
 LITTLE_LEFT = 0.1
 """Share of the explainable misfit beside a first law below which no second one is looked for."""
 SURE = 0.5
-"""Probability that a law must have to be named alone."""
+"""Probability that a law must have to be named on fitted frames alone, where they leave a doubt."""
 PUSH_LEAVES = 0.25
 """Share of the explainable misfit that a push may leave: pushes leave 0 to .05, swellings and a twist .29 to .48."""
 PULLS = 0.2

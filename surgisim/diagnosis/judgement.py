@@ -99,6 +99,8 @@ class Judgement:
     taken: float | None = None
     """Share of the fitted frames' mean square beyond the noise that it takes away."""
     over_placebo: Gain | None = None
+    others: tuple[Refit, ...] = ()
+    """Of an equivalence class, the laws that it may be instead, most probable first."""
 
     @property
     def named(self) -> bool:
@@ -147,9 +149,8 @@ def judged(
     if reason == "faint":
         return nothing(case, laws, took)
     verdict = "named" if reason == "named" else "unexplained"
-    rivals = [e for e in tried if e is not chosen and e.first.term != term and chances[e.first.term] > 0.1]
-    alike = [e for e in rivals if cos(case, chosen.first, e.first) > calibration.ALIKE]
-    if verdict == "named" and alike and chances[term] < calibration.SURE:
+    others = instead(chosen, tried, chances) if verdict == "named" else ()
+    if others:
         verdict = "equivalence class"
     if verdict == "unexplained":
         # What explains little, or is not believed, is no more probable than that, and all other laws with it.
@@ -162,7 +163,7 @@ def judged(
     # A law that is named beside another is as probable as that, not as it would be in the other's stead.
     chances |= {r.term: min(alone(r), chances[term]) for r in fitted.refits[1:]}
     after = fitted.moved if verdict != "unexplained" else case.base.simulated
-    return Judgement(verdict, reason, chosen, chances, explained, after, noise, took, over)
+    return Judgement(verdict, reason, chosen, chances, explained, after, noise, took, over, others)
 
 
 def stands(tried: list[Explanation]) -> Explanation:
@@ -171,6 +172,24 @@ def stands(tried: list[Explanation]) -> Explanation:
         if each.sound and (n == 0 or each.confirmed):
             return each
     return tried[0]
+
+
+def instead(chosen: Explanation, tried: list[Explanation], chances: dict[str, float]) -> tuple[Refit, ...]:
+    """What a single law may be instead: the most probable others that nothing speaks against.
+
+    With it they are a credible set, the fewest laws that hold calibration.CREDIBLE of the probability; none of them has
+    less than what would be left outside.
+    """
+    if len(chosen.fitted.refits) > 1:
+        return ()
+    least, held, found = 1 - calibration.CREDIBLE, chances[chosen.first.term], []
+    rivals = [e.first for e in tried if e.first.term != chosen.first.term and len(e.fitted.refits) == 1 and e.sound]
+    for law in sorted(rivals, key=lambda r: -chances[r.term]):
+        if held > calibration.CREDIBLE or chances[law.term] < least:
+            break
+        found.append(law)
+        held += chances[law.term]
+    return tuple(found)
 
 
 def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances: dict[str, float]) -> Explanation:

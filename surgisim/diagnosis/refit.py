@@ -5,13 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from surgisim.diagnosis.base import BOLD
+from surgisim.diagnosis import candidates
+from surgisim.diagnosis.base import BOLD, bounded, tracks_of
 from surgisim.diagnosis.base_fit import without
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
+from surgisim.diagnosis.laws import IMPOSSIBLE, beside, law_of, respond
 from surgisim.diagnosis.refine import refined
 
+SOFTER = (1.0, 0.3, 0.1)
+"""Shares of the base's stiffness in which a law is tried that does the same in softer tissue."""
 RUNS = 35
 """That fitting a law with everything about it free takes, roughly."""
 
@@ -46,17 +49,15 @@ class Refit:
 def refit(case, finding: Finding, evidence: float, z: np.ndarray, rounds: int = 3) -> Refit:
     """The law in the engine, its strength by secants of its response; what the tangent left out is put back.
 
-    Where the engine breaks down, a weaker law is tried once, then the tangent's word is taken.
+    Where the engine breaks down even in softer tissue, a weaker law is tried, then the tangent's word is taken.
     """
-    clip, base, until = case.clip, case.base, case.clip.until
+    base, until = case.base, case.clip.until
     amplitude, gain, response = finding.amplitude.copy(), -np.inf, None
     for _ in range(rounds):
-        try:
-            moved = respond(clip, base, law_of(finding.hypothesis, amplitude, clip), case.memo)
-        except IMPOSSIBLE:
+        change = added(case, finding.hypothesis, amplitude)
+        if change is None:
             amplitude = 0.5 * amplitude
             continue
-        change = moved - base.simulated
         white = case.whiten(change[:, :until])[:, None]
         G, b = float(case.space.gram(white, white)[0, 0]), float(case.space.gram(white, z[:, None])[0, 0])
         best = b / max(G, 1e-12)
@@ -71,6 +72,24 @@ def refit(case, finding: Finding, evidence: float, z: np.ndarray, rounds: int = 
     if response is None:
         return Refit(finding, finding.amplitude, np.zeros_like(base.simulated), 0.0, -np.inf)
     return Refit(finding, kept, response, gain, evidence + 0.5 * (gain - finding.gain))
+
+
+def added(case, h: Hypothesis, amplitude: np.ndarray) -> np.ndarray | None:
+    """What a law adds to the base over the whole clip [m], (K, T, 3); None where the engine breaks down.
+
+    A base that was fitted without a law may be many times too stiff. A weight that pulls as far in tissue like that is
+    so heavy that its inertia tears it: there it is tried in softer tissue, as much lighter.
+    """
+    softest = 1.0 if candidates.of(h).beside is None else min(SOFTER)
+    for share in (s for s in SOFTER if s >= softest):
+        x = bounded(case.base.x + np.array([np.log(share), 0.0, 0.0]), case.clip)
+        try:
+            law = law_of(*beside(h, amplitude, share), case.clip)
+            moved = respond(case.clip, replace(case.base, x=x), law, case.memo)
+            return moved - (case.base.simulated if share == 1 else tracks_of(case.clip, x, case.memo))
+        except IMPOSSIBLE:
+            continue
+    return None
 
 
 def freed(case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:

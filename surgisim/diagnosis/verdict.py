@@ -59,8 +59,8 @@ def write(
         if not said_of.named:
             shown = replace(shown, after=shown.before, placebo=None)
     verdict, chances, named = said_of.verdict, said_of.chances, said_of.named
-    accepted = {r.term for r in said_of.accepted}
-    effects = [_effect(case, r, chances, accepted) for r in said_of.accepted]
+    members = [*said_of.accepted, *said_of.others]
+    effects = [_effect(case, r, chances, {m.term for m in members}) for r in members]
     noise, explained = said_of.noise, said_of.explained
     fit, held_out = errors(case, shown.before, shown.after, shown.placebo, noise.sigma)
     say("verdict")
@@ -74,10 +74,10 @@ def write(
         alike = [f for f in laws[refits[0].term].findings if f.hypothesis.scope == scope]
         heat = of_places(clip, alike, base.prepared.simulator.rest)
     if named and case.settings.experiment and len(refits) > 1:
-        pair = [law_of(r.finding.hypothesis, r.amplitude, clip) for r in refits[:2]]
-        effects[0]["separating_experiment"] = separating(
-            clip, base, *pair, case.memo, (refits[0].term, refits[1].term), rng, case.workers
-        )
+        told_apart = refits[0], (said_of.others or refits[1:])[0]
+        pair = [law_of(r.finding.hypothesis, r.amplitude, clip) for r in told_apart]
+        names = told_apart[0].term, told_apart[1].term
+        effects[0]["separating_experiment"] = separating(clip, base, *pair, case.memo, names, rng, case.workers)
     said = _words(case, said_of, refits, laws, z, held_out)
     above = detectable(case, laws)
     diagnosis = Diagnosis(
@@ -232,8 +232,7 @@ def _words(case: Case, said_of: Judgement, refits, laws, z, held_out: dict) -> s
         found = [(r, described_of(case, r)) for r in chosen.fitted.refits]
         said = words.sentence([(r.finding.hypothesis, p, r.finding.size) for r, p in found], said_of.explained)
         if verdict == "equivalence class":
-            others = sorted((t for t in said_of.chances if t != chosen.first.term), key=lambda t: -said_of.chances[t])
-            said += f" {others[0]} would look nearly the same."
+            said += words.instead([(r.term, said_of.chances[r.term]) for r in said_of.others])
         if chosen.ahead is not None and not chosen.visible:
             said += " The frames held out cannot show it."
         return said + words.beside(told(case, said_of.after))

@@ -38,6 +38,12 @@ def _told(h: Hypothesis, parameters: dict[str, dict], number: int) -> tuple[str,
     return said, law.added.format(amount=amount)
 
 
+def instead(others: Sequence[tuple[str, float]]) -> str:
+    """others: laws that it may be as well, with their probabilities."""
+    told = " or ".join(f"{term} (probability {chance:.2f})" for term, chance in others)
+    return f" It may be {told} instead: this recording does not tell them apart."
+
+
 def nothing(above: float, later: tuple[float, float] | None = None) -> str:
     """later: misfit and noise of the frames held out [mm], where the misfit stands out."""
     seen = f"Effects above {1e3 * above:.2g} mm RMS would mostly have been seen"
