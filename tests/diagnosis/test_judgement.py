@@ -85,6 +85,28 @@ def test_what_nothing_confirms_and_the_fitted_frames_do_not_settle_is_supported_
     assert reason(explanation(ahead=ahead, evidence=CLEAR + 1), chance=0.4) == "named"
 
 
+@pytest.mark.parametrize(
+    ("chances", "others"),
+    [
+        ({"damage": 0.93, "fibre": 0.06}, []),
+        ({"damage": 0.7, "fibre": 0.28}, ["fibre"]),
+        ({"damage": 0.85, "fibre": 0.08}, []),
+        ({"damage": 0.5, "fibre": 0.2, "tether": 0.25}, ["tether", "fibre"]),
+        ({"damage": 0.62, "fibre": 0.3, "tether": 0.08}, ["fibre"]),
+        ({"damage": 0.4, "stiffening": 0.3, "tether": 0.3}, ["tether"]),
+    ],
+)
+def test_a_class_holds_nine_tenths_of_the_probability_as_far_as_nothing_speaks_against_its_laws(chances, others):
+    tried = [explanation(term, ahead=WORSE if term == "stiffening" else BETTER) for term in chances]
+    assert [r.term for r in judgement.instead(tried[0], tried, chances)] == others
+
+
+def test_two_laws_named_together_are_no_class():
+    pair, other = explanation("damage"), explanation("fibre")
+    pair.fitted.refits.append(explanation("tether").first)
+    assert judgement.instead(pair, [pair, other], {"damage": 0.6, "fibre": 0.4}) == ()
+
+
 def two(more: int, chance: float, cos: float) -> tuple[Explanation, list[Explanation], dict[str, float]]:
     freer = explanation("hidden_contact")
     h = freer.first.finding.hypothesis

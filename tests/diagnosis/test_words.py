@@ -8,7 +8,7 @@ import pytest
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.judgement import REASONS
 from surgisim.diagnosis.markers import markers
-from surgisim.diagnosis.words import WHY, drawn, nothing, sentence, unbelieved
+from surgisim.diagnosis.words import WHY, drawn, instead, nothing, sentence, unbelieved
 from surgisim.physics.place import Place
 
 PUSH = Hypothesis("hidden_contact", np.eye(3), 0, Place((-0.022, -0.007, 0.003), 0.003), 0.48, 1.2)
@@ -56,6 +56,11 @@ def test_a_number_without_a_unit_is_said_without_one():
 def test_a_load_is_said_in_grams():
     load = Hypothesis("added_mass", np.eye(1), 1, Place((0.0, 0.0, 0.0), 0.003), 0.6)
     assert "a weight there (mass = 8.6 g, 6.88 to 10.3)" in sentence([(load, of("mass", 8.6e-3, "kg"), 6e-4)], 1.0)
+
+
+def test_what_a_law_may_be_instead_is_said():
+    said = instead([("tether", 0.31), ("fibre", 0.12)])
+    assert "tether (probability 0.31) or fibre (probability 0.12)" in said
 
 
 def test_nothing_found_says_where_later_frames_differ_all_the_same():
