@@ -1,6 +1,6 @@
 """What all steps of a diagnosis share."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener
-from surgisim.diagnosis.nuisance import Group, positions, release
+from surgisim.diagnosis.nuisance import Group, positions, release, span
 from surgisim.diagnosis.prospect import Prospect, prospect
 from surgisim.diagnosis.saturated import Saturated, SmoothFit, saturated
 
@@ -41,6 +41,13 @@ class Case:
     """What a residual may hold beside physics, over the whole clip."""
     drift: float
     """How far the camera drifts over the clip, as its rest shows [m]."""
+
+    def drifting(self, size: float) -> "Case":
+        """The same where the camera drifts so far over the clip [m]."""
+        times, columns = size / self.drift, self.space.columns.copy()
+        columns[:, span(self.groups, "drift")] *= times
+        groups = [replace(g, columns=times * g.columns) if g.name == "drift" else g for g in self.groups]
+        return replace(self, space=metric(columns), groups=groups, drift=size)
 
     @property
     def misfit(self) -> float:

@@ -32,6 +32,8 @@ from surgisim.recordings.recording import Recording
 Progress = Callable[[float, float, str], None]
 MOST_HELD = 4e-3
 """How far what is held may end from where its box does [m]."""
+STEADIER = 0.7
+"""Share of a drift that must be left beside a law for the search to be made again."""
 FIRSTS = 2
 """Laws beside which a second one is looked for."""
 
@@ -104,8 +106,26 @@ def first_look(
         return search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.39 * s, 1, text))
 
     findings = searched(case)
-    moved = laid_anew(case, by_law(findings), progress)
-    return (case, findings) if moved is None else (moved, searched(moved))
+    for mend in (laid_anew, steadied):
+        mended = mend(case, by_law(findings), progress)
+        if mended is not None:
+            case, findings = mended, searched(mended)
+    return case, findings
+
+
+def steadied(case: Case, laws: Scores, progress: Progress) -> Case | None:
+    """The case with the drift of the camera that is left where the best law's response is taken off.
+
+    None where that is hardly smaller. A camera's drift is learned from tissue at rest; what breathes moves there too.
+    """
+    top, clip = max(laws, key=lambda term: laws[term].evidence), case.clip
+    if laws[top].evidence < calibration.THRESHOLD or "drift" in case.settings.without:
+        return None
+    progress(0.64, 1, f"the camera's drift beside {top}")
+    law = refit(case, laws[top].best, laws[top].evidence, case.z)
+    calm = replace(clip, moved=clip.moved - law.response * clip.seen[..., None])
+    drift = nuisance.drift_of(calm, case.noise, case.settings.offsets)
+    return case.drifting(drift) if drift < STEADIER * case.drift else None
 
 
 def laid_anew(case: Case, laws: Scores, progress: Progress) -> Case | None:

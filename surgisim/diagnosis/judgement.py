@@ -211,21 +211,18 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
 def _reason(case: Case, chosen: Explanation, chance: float, explained: float, took: float, over: Gain | None) -> str:
     """Why it is named, or not; chance: its probability among all laws."""
     evidence = chosen.log_evidence if case.settings.calibrated else np.inf
-    if (
-        case.settings.calibrated
-        and not case.overstretched
-        and evidence < calibration.CLEAR
-        and took < calibration.TAKEN
-    ):
+    certain = evidence >= calibration.CLEAR or case.overstretched
+    if not certain and took < calibration.TAKEN:
         return "faint"
     if chosen.loose:
         return "loose"
     if chosen.drawn:
         return "drawn"
+    # What is not believed says that something is hidden only where that is certain.
     if chosen.refuted:
-        return "refuted"
+        return "refuted" if certain else "faint"
     if evidence < calibration.THRESHOLD or explained < calibration.EXPLAINED:
-        return "little"
+        return "little" if certain else "faint"
     if chosen.visible and not chosen.confirmed:
         return "unconfirmed"
     if not chosen.visible and evidence < calibration.CLEAR and chance < calibration.SURE:

@@ -1,6 +1,6 @@
 """What may be turned in a fit with everything about a law free, and how far it may be off."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,14 @@ EXTENT, MOMENT, TURN = 0.5, 0.12, 0.25
 class Knob:
     turn: Callable[[Hypothesis, np.ndarray, float, Clip], Start]
     """Hypothesis and amplitude turned by some prior standard deviations."""
+
+
+def turned(h: Hypothesis, amplitude: np.ndarray, knobs: Sequence[Knob], x: np.ndarray, clip: Clip) -> Start:
+    """The hypothesis and its amplitude with every knob turned by x standard deviations."""
+    amplitude = amplitude.astype(float)
+    for knob, by in zip(knobs, x, strict=True):
+        h, amplitude = knob.turn(h, amplitude, float(by), clip)
+    return h, amplitude
 
 
 def strength(h: Hypothesis, amplitude: np.ndarray) -> list[Knob]:

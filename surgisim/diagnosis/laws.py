@@ -8,6 +8,7 @@ from surgisim.diagnosis import candidates
 from surgisim.diagnosis.base import SAFETY, Base, boldly, carried
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.knobs import turned
 from surgisim.diagnosis.law import Law
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.uncertain import Spread
@@ -18,6 +19,10 @@ from surgisim.physics.place import Misplaced
 
 IMPOSSIBLE = (Breakdown, Misplaced)
 """Tissue torn apart, or a place outside the body: not a law of this clip."""
+
+
+COARSE = 200
+"""Draws from what may be turned about a law, of which intervals are read where none was fitted."""
 
 
 class Clash(ValueError):
@@ -94,16 +99,20 @@ def described(
 ) -> dict[str, dict]:  # fmt: skip
     """Parameters with 90 % intervals and units, as diagnosis.json has them.
 
-    draws: the law with other numbers that would do; without them only its strength has an interval, from `spread`.
+    draws: the law with other numbers that would do; without them its strength has the interval of `spread`, and the
+    others are as uncertain as the search was coarse.
     """
     if draws:
         return _of_draws(h, amplitude, clip, draws)
     candidate = candidates.of(h)
     known = Spread(amplitude, spread, 1.645 * float(base.spread[0]))
-    result = {}
-    for key, (value, unit) in candidate.parameters(h, amplitude, clip).items():
+    knobs = candidate.knobs(h, amplitude)
+    coarse = [turned(h, amplitude, knobs, x, clip) for x in np.random.default_rng(0).normal(size=(COARSE, len(knobs)))]
+    result = _of_draws(h, amplitude, clip, coarse)
+    for key, (value, _) in candidate.parameters(h, amplitude, clip).items():
         low, high = candidate.interval(key, value, known)
-        result[key] = {"value": value, "low": float(low), "high": float(high), "unit": unit}
+        if low < high:
+            result[key] |= {"low": float(low), "high": float(high)}
     return result
 
 

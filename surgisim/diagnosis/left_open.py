@@ -6,6 +6,7 @@ import numpy as np
 from scipy.linalg import cho_solve
 
 from surgisim.diagnosis.context import Case
+from surgisim.diagnosis.nuisance import span
 
 TOLD = 0.7
 """Share of its prior spread below which a nuisance is told by the recording."""
@@ -54,16 +55,13 @@ def drifted(case: Case, after: np.ndarray | None = None) -> float | None:
 
     after: displacement of the points beside which it drifts [m], (K, T, 3); the base's if None.
     """
-    at = 0
-    for group in case.groups:
-        if group.name == "drift":
-            until = case.clip.until
-            z = case.z if after is None else case.whiten(case.clip.moved[:, :until] - after[:, :until])
-            likely = case.space.likely(z)[at : at + len(group.columns)]
-            end = np.einsum("c,cki->ki", likely, group.columns[:, :, case.clip.until - 1])
-            return float(np.sqrt((end**2).sum(1).mean()))
-        at += len(group.columns)
-    return None
+    mine, until = span(case.groups, "drift"), case.clip.until
+    if mine.start == mine.stop:
+        return None
+    z = case.z if after is None else case.whiten(case.clip.moved[:, :until] - after[:, :until])
+    columns = next(g.columns for g in case.groups if g.name == "drift")
+    end = np.einsum("c,cki->ki", case.space.likely(z)[mine], columns[:, :, until - 1])
+    return float(np.sqrt((end**2).sum(1).mean()))
 
 
 def told(case: Case, after: np.ndarray | None = None) -> list[str]:

@@ -91,14 +91,19 @@ def chosen(groups: list[Group], settings: Diagnosing) -> list[Group]:
     return [g for g in groups if g.name not in settings.without and len(g.columns)]
 
 
-def likely_held(groups: list[Group], likely: np.ndarray) -> float:
-    """How far beyond its box what is held seems to end [m]; likely: of all columns, the groups' first, (M,)."""
+def span(groups: list[Group], name: str) -> slice:
+    """Where the columns of a group stand among all groups' columns; empty where it is left out."""
     at = 0
     for group in groups:
-        if group.name == "held":
-            return HELD * float(likely[at])
+        if group.name == name:
+            return slice(at, at + len(group.columns))
         at += len(group.columns)
-    return 0.0
+    return slice(at, at)
+
+
+def likely_held(groups: list[Group], likely: np.ndarray) -> float:
+    """How far beyond its box what is held seems to end [m]; likely: of all columns, the groups' first, (M,)."""
+    return HELD * float(likely[span(groups, "held")].sum())
 
 
 def positions(groups: list[Group], names: set[str]) -> list[int]:

@@ -16,9 +16,8 @@ import numpy as np
 
 from surgisim.diagnosis import calibration, candidates
 from surgisim.diagnosis.base import SPREAD, START, bounded
-from surgisim.diagnosis.clip import OPENS, Clip
-from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.knobs import Knob, Start
+from surgisim.diagnosis.clip import OPENS
+from surgisim.diagnosis.knobs import Start, turned
 from surgisim.diagnosis.laws import IMPOSSIBLE, Law, beside, joined, law_of, respond
 from surgisim.diagnosis.ring_down import EARLIEST, LATE, LATEST
 from surgisim.estimation.trial import at_once
@@ -152,11 +151,3 @@ def refined(
     draws = [all_turned(near)[0] for near in rng.multivariate_normal(x, spread, DRAWS)]
     laws, near = [list(d) for d in zip(*draws, strict=True)], np.sqrt(np.diag(spread)[own : own + 3]) * SPREAD
     return Refined(all_turned(x)[0], laws, there, near, response, nothing - best)
-
-
-def turned(h: Hypothesis, amplitude: np.ndarray, knobs: Sequence[Knob], x: np.ndarray, clip: Clip) -> Start:
-    """The hypothesis and its amplitude with every knob turned by x standard deviations."""
-    amplitude = amplitude.astype(float)
-    for knob, by in zip(knobs, x, strict=True):
-        h, amplitude = knob.turn(h, amplitude, float(by), clip)
-    return h, amplitude

@@ -6,15 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.diagnosis import candidates
-from surgisim.diagnosis.base import BOLD, bounded, tracks_of
+from surgisim.diagnosis.base import BOLD, bounded
 from surgisim.diagnosis.base_fit import without
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import IMPOSSIBLE, beside, law_of, respond
+from surgisim.diagnosis.laws import IMPOSSIBLE, Law, beside, law_of, respond
 from surgisim.diagnosis.refine import refined
 
-SOFTER = (1.0, 0.3, 0.1)
-"""Shares of the base's stiffness in which a law is tried that does the same in softer tissue."""
+SOFTER = (0.3, 0.1)
+"""Shares of the base's stiffness with which a law that tears it is tried."""
+NOTHING = Law({}, {}, None)
 RUNS = 35
 """That fitting a law with everything about it free takes, roughly."""
 
@@ -80,13 +81,18 @@ def added(case, h: Hypothesis, amplitude: np.ndarray) -> np.ndarray | None:
     A base that was fitted without a law may be many times too stiff. A weight that pulls as far in tissue like that is
     so heavy that its inertia tears it: there it is tried in softer tissue, as much lighter.
     """
-    softest = 1.0 if candidates.of(h).beside is None else min(SOFTER)
-    for share in (s for s in SOFTER if s >= softest):
-        x = bounded(case.base.x + np.array([np.log(share), 0.0, 0.0]), case.clip)
+    clip, base, memo = case.clip, case.base, case.memo
+    try:
+        return respond(clip, base, law_of(h, amplitude, clip), memo) - base.simulated
+    except IMPOSSIBLE:
+        if candidates.of(h).beside is None:
+            return None
+    for share in SOFTER:
+        x = bounded(base.x[:3] + np.array([np.log(share), 0.0, 0.0]), clip)
+        softer = replace(base, x=np.concatenate([x, base.x[3:]]))
         try:
-            law = law_of(*beside(h, amplitude, share), case.clip)
-            moved = respond(case.clip, replace(case.base, x=x), law, case.memo)
-            return moved - (case.base.simulated if share == 1 else tracks_of(case.clip, x, case.memo))
+            law = law_of(*beside(h, amplitude, float(np.exp(x[0] - base.x[0]))), clip)
+            return respond(clip, softer, law, memo) - respond(clip, softer, NOTHING, memo)
         except IMPOSSIBLE:
             continue
     return None

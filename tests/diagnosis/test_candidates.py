@@ -12,8 +12,8 @@ from surgisim import diagnosis
 from surgisim.diagnosis import words
 from surgisim.diagnosis.base import carried
 from surgisim.diagnosis.candidates import blocks, catalogue, costly
+from surgisim.diagnosis.knobs import turned
 from surgisim.diagnosis.laws import described, law_of, steps
-from surgisim.diagnosis.refine import turned
 from surgisim.physics.catalogue import catalogue as terms
 
 LAWS = catalogue()

@@ -67,7 +67,9 @@ def test_what_they_gain_or_lose_counts_among_the_evidence():
         (explanation(ahead=ALIKE), "unconfirmed"),
         (explanation(ahead=BLIND), "named"),
         (explanation(ahead=None), "named"),
-        (explanation(evidence=THRESHOLD - 1), "little"),
+        (explanation(evidence=THRESHOLD - 1), "faint"),
+        (explanation(ahead=WORSE, evidence=CLEAR - 1), "faint"),
+        (explanation(ahead=WORSE, evidence=CLEAR + 1), "refuted"),
         (explanation("hidden_contact", left=PUSH_LEAVES + 0.1, out=-0.8), "loose"),
         (explanation("hidden_contact", out=PULLS + 0.1), "drawn"),
         (explanation("hidden_contact", out=-0.8), "named"),
@@ -105,6 +107,14 @@ def test_two_laws_named_together_are_no_class():
     pair, other = explanation("damage"), explanation("fibre")
     pair.fitted.refits.append(explanation("tether").first)
     assert judgement.instead(pair, [pair, other], {"damage": 0.6, "fibre": 0.4}) == ()
+
+
+@pytest.mark.parametrize(
+    ("evidence", "overstretched", "said"), [(49, False, "faint"), (51, False, "little"), (20, True, "little")]
+)
+def test_what_explains_little_says_that_something_is_hidden_only_where_that_is_certain(evidence, overstretched, said):
+    case = SimpleNamespace(settings=CASE.settings, overstretched=overstretched)
+    assert reason(explanation(evidence=evidence), explained=0.3, case=case) == said
 
 
 def two(more: int, chance: float, cos: float) -> tuple[Explanation, list[Explanation], dict[str, float]]:

@@ -8,11 +8,13 @@ threads, all phases of a period mixes of four columns (waves.py).
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from surgisim.diagnosis import knobs, waves
 from surgisim.diagnosis.candidate import Candidate, Parts, stronger
+from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import Block, angles, plane, scale
 from surgisim.diagnosis.hypothesis import SETS_IN, Hypothesis
 from surgisim.diagnosis.law import Law, placed
@@ -36,8 +38,8 @@ STARTS = (0.0, 0.4, 0.8, 1.3)
 THREADS = np.arange(3) * np.pi / 3
 STANDS = np.inf
 """Wavelength of what is all in phase."""
-MAY_TURN = 0.7
-"""How far a phase may be off [rad]."""
+MAY_SLOW, MAY_TURN = 0.15, 0.7
+"""How far a period (logarithm) and a phase [rad] may be off."""
 
 
 def law(h, amplitude, clip) -> Law:
@@ -140,9 +142,16 @@ def _hypotheses(where: Where, form: tuple, periods, phases, mixed) -> Iterator[H
         yield Hypothesis(NAME, mix, 1, where.place, start, None, about, where.scope)
 
 
+def _slower(h: Hypothesis, amplitude: np.ndarray, by: float, clip: Clip) -> knobs.Start:
+    """Of another period, in step with the old one in the middle of the fitted frames."""
+    period, middle = h.about["period"] * float(np.exp(MAY_SLOW * by)), clip.time[clip.until - 1] / 2
+    phase = h.about["phase"] + 2 * np.pi * middle * (1 / h.about["period"] - 1 / period)
+    return replace(h, about={**h.about, "period": period, "phase": phase}), amplitude
+
+
 def turned(h: Hypothesis, amplitude: np.ndarray) -> list[knobs.Knob]:
     travels = [] if np.isinf(h.about["wavelength"]) else [knobs.logarithm("wavelength", 0.4)]
-    rhythm = [knobs.logarithm("period", 0.15), *travels, knobs.turn("axis"), knobs.plus("phase", MAY_TURN)]
+    rhythm = [knobs.Knob(_slower), *travels, knobs.turn("axis"), knobs.plus("phase", MAY_TURN)]
     return [*knobs.strength(h, amplitude), *knobs.place(h), *knobs.moment(h, "onset"), *rhythm]
 
 

@@ -59,7 +59,7 @@ def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:
 
 def turned(h: Hypothesis, amplitude: np.ndarray) -> list[knobs.Knob]:
     # The rate is what the amplitude scales.
-    free = [knobs.logarithm("onset", 0.4), knobs.logarithm("most", 0.5, most=1.0)]
+    free = [knobs.logarithm("onset", 0.6), knobs.logarithm("most", 0.5, most=1.0)]
     return [*knobs.strength(h, amplitude), *knobs.place(h), *free]
 
 

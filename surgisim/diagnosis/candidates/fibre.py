@@ -63,7 +63,7 @@ CANDIDATE = Candidate(
     law=law,
     tried=tried,
     finer=finer,
-    knobs=lambda h, a: [*knobs.strength(h, a), *knobs.place(h), knobs.logarithm("k2", 0.6), knobs.turn("axis")],
+    knobs=lambda h, a: [*knobs.strength(h, a), *knobs.place(h), knobs.logarithm("k2", 1.0), knobs.turn("axis")],
     interval=scaled("k1", over_stiffness=True),
     beside=stronger,
     seen="the tissue {where} resists being stretched along one direction",

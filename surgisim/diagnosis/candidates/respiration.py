@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from surgisim.diagnosis import knobs, pushes
 from surgisim.diagnosis.candidate import Candidate, Parts
+from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import Block, angles, knots, spread
 from surgisim.diagnosis.hypothesis import Hypothesis, ease
 from surgisim.diagnosis.law import Law
@@ -20,6 +22,8 @@ SOME = 0.7
 """Least share of a period that the fitted frames must hold."""
 SETS_IN = 0.5
 """How long it takes to set in [s]."""
+MAY_HURRY, MAY_TURN = 0.15, 0.5
+"""How far a rate (logarithm) and a phase [rad] may be off."""
 
 
 def law(h, amplitude, clip) -> Law:
@@ -72,12 +76,48 @@ def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:
     yield _block(look, h.about["rate"] * np.exp(reach * np.linspace(-1, 1, 13)))
 
 
+def _later(amplitude: np.ndarray, angle: float) -> np.ndarray:
+    """The same breath, its phase further by an angle [rad]; amplitude: (12,)."""
+    s, c, s2, c2 = amplitude.reshape(4, 3)
+    first, second = ((np.cos(n * angle), np.sin(n * angle)) for n in (1, 2))
+    return np.concatenate([
+        first[0] * s - first[1] * c, first[1] * s + first[0] * c,
+        second[0] * s2 - second[1] * c2, second[1] * s2 + second[0] * c2,
+    ])  # fmt: skip
+
+
+def _faster(h: Hypothesis, amplitude: np.ndarray, by: float, clip: Clip) -> knobs.Start:
+    """Of another rate, in step with the old one in the middle of the fitted frames."""
+    rate, middle = h.about["rate"] * float(np.exp(MAY_HURRY * by)), clip.time[clip.until - 1] / 2
+    amplitude = _later(amplitude, -2 * np.pi * (rate - h.about["rate"]) * middle)
+    return replace(h, about={**h.about, "rate": rate}), amplitude
+
+
+def _aside(which: int) -> knobs.Knob:
+    """Along another direction, turned about one of the two axes across its own."""
+
+    def turn(h, amplitude, by, clip):
+        parts = amplitude.reshape(4, 3)
+        own = np.linalg.svd(parts, full_matrices=True)[2]
+        a, b = own[0], own[which]
+        angle = knobs.TURN * by
+        by_turn = np.eye(3) + (np.cos(angle) - 1) * (np.outer(a, a) + np.outer(b, b))
+        by_turn += np.sin(angle) * (np.outer(b, a) - np.outer(a, b))
+        return h, (parts @ by_turn.T).ravel()
+
+    return knobs.Knob(turn)
+
+
+def turned(h: Hypothesis, amplitude: np.ndarray) -> list[knobs.Knob]:
+    phase = knobs.Knob(lambda h, a, by, clip: (h, _later(a, MAY_TURN * by)))
+    return [*knobs.strength(h, amplitude), knobs.Knob(_faster), phase, _aside(1), _aside(2)]
+
+
 CANDIDATE = Candidate(
     law=law,
     tried=tried,
     finer=finer,
-    # A base's motion enters linearly: its direction and course stay as the search found them.
-    knobs=lambda h, a: [*knobs.strength(h, a), knobs.logarithm("rate", 0.15)],
+    knobs=turned,
     interval=scaled("amplitude"),
     seen="the base moves to and fro, touched or not, as with breathing",
     added="a moving base ({amount})",
