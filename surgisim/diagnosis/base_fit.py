@@ -17,7 +17,7 @@ from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Whitener
-from surgisim.diagnosis.ring_down import ASIDE, RingDown, told
+from surgisim.diagnosis.ring_down import ASIDE, RingDown, apart, softest, told
 from surgisim.diagnosis.tangent import Tangent, base_piola, tangent
 from surgisim.mpm.setup import Prepared
 from surgisim.mpm.simulator import Breakdown
@@ -69,7 +69,9 @@ def fit_base(
             if n == rounds or cost < promised + AGAIN + ASIDE * max(cost - whiten.free, 0.0):
                 break
         if n == 0 and begun is None:
-            y, aside = around.best(say)
+            ends = around.descents(say)
+            chosen = softest(ends)
+            y, aside = chosen.y, apart(chosen, ends)
         else:
             y = _on(around, y, say)
         promised = around.cost(y, around.left(y))
@@ -87,10 +89,11 @@ def _on(around: RingDown, y: np.ndarray, say: Callable[[str], None]) -> np.ndarr
     return at.y
 
 
-def without(case, response: np.ndarray, say: Callable[[str], None]) -> tuple[np.ndarray, np.ndarray]:
-    """The base of a `diagnose.Case` once a law's response over the whole clip [m], (K, T, 3), is taken off.
+def without(case, response: np.ndarray, say: Callable[[str], None]) -> tuple[list[np.ndarray], np.ndarray]:
+    """Bases of a `diagnose.Case` once a law's response over the whole clip [m], (K, T, 3), is taken off.
 
-    Its numbers and moments of release, (3 + R,), and how far others about as good are, (3,). Where something is hidden,
+    Numbers and moments of release, (3 + R,), of the best and of where other descents got to, and how far those about
+    as good are from the best, (3,). Where something is hidden,
     a base makes up for it with numbers that no step from there leads back from.
     """
     clip, base, until = case.clip, case.base, case.clip.until
@@ -101,7 +104,9 @@ def without(case, response: np.ndarray, say: Callable[[str], None]) -> tuple[np.
         rest, case.whiten, case.beside_base, case.memo, bodies, base.prepared.simulator.carry(clip.rest),
         np.concatenate([base.x, late]), base.run, base.simulated[:, :until], base.slopes[1] / SPREAD[1],
     )  # fmt: skip
-    return around.best(say)
+    ends = around.descents(say)
+    chosen = softest(ends)
+    return [chosen.y, *(d.y for d in ends if d is not chosen)], apart(chosen, ends)
 
 
 def settled(clip: Clip, whiten: Whitener, space: Metric, slopes: slice, base: Base, memo: Memo) -> Base:

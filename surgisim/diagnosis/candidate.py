@@ -51,6 +51,8 @@ class Candidate:
     """Blocks around a hypothesis; the last argument is a share of the coarse search's spacing."""
     beside: Callable[[Hypothesis, np.ndarray, float], tuple[Hypothesis, np.ndarray]] | None = None
     """What does the same in tissue some times as stiff; None where strength shows by itself."""
+    light: Callable[[Hypothesis, np.ndarray, Clip], Law] | None = None
+    """The same without its inertia; None where it has none that counts."""
     numbers: Callable[[Hypothesis, np.ndarray], Numbers] | None = None
     """Parameters of a law that acts on the grips' motion and so has none of a term."""
     modelled: Callable[[Hypothesis, np.ndarray], dict[str, dict[str, float]]] | None = None

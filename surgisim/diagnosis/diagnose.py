@@ -12,7 +12,7 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, judgement, nuisance, verdict
 from surgisim.diagnosis.base import HELD, Base
 from surgisim.diagnosis.base_fit import fit_base, settled
-from surgisim.diagnosis.candidates import Parts, blocks, costly, finer
+from surgisim.diagnosis.candidates import Parts, blocks, costly, finer, of_law
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.context import Case, workers
 from surgisim.diagnosis.evidence import Finding, Score, Scores, by_law, highest, judge
@@ -32,8 +32,8 @@ from surgisim.recordings.recording import Recording
 Progress = Callable[[float, float, str], None]
 MOST_HELD = 4e-3
 """How far what is held may end from where its box does [m]."""
-STEADIER = 0.7
-"""Share of a drift that must be left beside a law for the search to be made again."""
+STEADIER = 0.9
+"""Share of a drift beyond which a law that leaves it has nothing to do with it."""
 FIRSTS = 2
 """Laws beside which a second one is looked for."""
 
@@ -114,18 +114,29 @@ def first_look(
 
 
 def steadied(case: Case, laws: Scores, progress: Progress) -> Case | None:
-    """The case with the drift of the camera that is left where the best law's response is taken off.
+    """The case with the drift of the camera that is most likely beside the best law; None where it stays.
 
-    None where that is hardly smaller. A camera's drift is learned from tissue at rest; what breathes moves there too.
+    A drift is learned from tissue at rest, and what breathes moves there too. So where the law takes part of the drift
+    away, both are weighed together: the likelihood of all fitted frames for the law at its best, drift by drift.
     """
-    top, clip = max(laws, key=lambda term: laws[term].evidence), case.clip
-    if laws[top].evidence < calibration.THRESHOLD or "drift" in case.settings.without:
+    top, clip, settings = max(laws, key=lambda term: laws[term].evidence), case.clip, case.settings
+    if laws[top].evidence < calibration.THRESHOLD or "drift" in settings.without:
         return None
-    progress(0.64, 1, f"the camera's drift beside {top}")
     law = refit(case, laws[top].best, laws[top].evidence, case.z)
     calm = replace(clip, moved=clip.moved - law.response * clip.seen[..., None])
-    drift = nuisance.drift_of(calm, case.noise, case.settings.offsets)
-    return case.drifting(drift) if drift < STEADIER * case.drift else None
+    if nuisance.drift_of(calm, case.noise, settings.offsets) > STEADIER * case.drift:
+        return None
+    progress(0.64, 1, f"the camera's drift beside {top}")
+    parts = list(of_law(top, clip, case.base, case.memo))
+
+    def support(other: Case) -> float:
+        gain = max(f.gain for f in search(other, other.z, case.nulls[:, :0], lambda *_: None, parts))
+        return 0.5 * (gain - other.misfit - other.space.log_det) + float(nuisance.drift_prior(other.drift))
+
+    least = nuisance.DRIFTS[0]
+    sizes = np.geomspace(least, case.drift, 1 + round(np.log2(max(case.drift / least, 1))))[:-1]
+    best = max([case, *(case.drifting(size) for size in sizes)], key=support)
+    return None if best is case else best
 
 
 def laid_anew(case: Case, laws: Scores, progress: Progress) -> Case | None:

@@ -99,7 +99,8 @@ def _freed(case, refits: list, say) -> list[Joint]:
         joined([law_of(*start, case.clip) for start in starts])
     except Clash:
         return []
-    found = refined(case, case.z, starts, sum(r.response for r in refits), say, refits[0].x)
+    bases = [] if refits[0].x is None else [refits[0].x]
+    found = refined(case, case.z, starts, sum(r.response for r in refits), say, bases)
     if found is None:
         return []
     spread = found.spread if refits[0].spread is None else np.maximum(found.spread, refits[0].spread)

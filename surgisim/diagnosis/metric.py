@@ -17,6 +17,11 @@ class Metric:
     """U, (N, M) float32."""
     factor: tuple
 
+    @property
+    def log_det(self) -> float:
+        """log determinant of the covariance."""
+        return float(2 * np.log(np.diag(self.factor[0])).sum())
+
     def seen_through(self, vectors: np.ndarray) -> np.ndarray:
         """U^T of vectors (N,) or (N, C)."""
         return (self.columns.T @ vectors.astype(np.float32)).astype(float)

@@ -136,9 +136,14 @@ def drifting(clip: Clip, size: float, frames: int | None = None) -> Group:
     return Group("drift", size * np.concatenate([field[..., None] * e for e in np.eye(3)]))
 
 
+def drift_prior(size: np.ndarray) -> np.ndarray:
+    """log density of how far a camera drifts over a clip [m], but for a constant."""
+    return -0.5 * (np.log(size / DRIFT) / DRIFT_SPREAD) ** 2
+
+
 def drift_of(clip: Clip, noise: Noise, offsets: bool) -> float:
     """How far the camera drifts over a clip [m], from the rest before the first grasp: RMS of the posterior."""
-    log_prior = -0.5 * (np.log(DRIFTS / DRIFT) / DRIFT_SPREAD) ** 2
+    log_prior = drift_prior(DRIFTS)
     busy = clip.motion.active.any(0) if len(clip.motion.active) else np.ones(clip.frames, bool)
     rest = min(int(busy.argmax()) if busy.any() else clip.frames, clip.until)
     if rest >= LEAST_REST:

@@ -50,11 +50,12 @@ class Refined:
 
 def refined(
     case, z: np.ndarray, starts: Sequence[Start], response: np.ndarray, say: Callable[[str], None],
-    base_at: np.ndarray | None = None,
+    bases_at: Sequence[np.ndarray] = (),
 ) -> Refined | None:  # fmt: skip
     """The best laws near `starts`, whose response together [m], (K, T, 3), is known.
 
-    case: a `diagnose.Case`; z: whitened residual of the base, (N,); base_at: a base to begin with as well, (3 + R,).
+    case: a `diagnose.Case`; z: whitened residual of the base, (N,); bases_at: bases to begin with as well, (3 + R,)
+    each.
     None where the engine breaks down at the start.
     """
     clip, base, whiten, until = case.clip, case.base, case.whiten, case.clip.until
@@ -99,9 +100,7 @@ def refined(
     usual = (np.concatenate([[START[0], base.x[1], START[2]], 0 * late + OPENS]) - start) / reach
     # Each law's numbers have a prior around where they begin, the base's around what tissue is.
     prior = np.concatenate([np.zeros(own), (np.concatenate([START, 0 * late + OPENS]) - start) / reach])
-    bases = [0 * usual, likely, usual]
-    if base_at is not None:
-        bases.append((base_at - start) / reach)
+    bases = [0 * usual, likely, usual, *((at - start) / reach for at in bases_at)]
     begins = [np.concatenate([np.zeros(own), by]) for by in bases]
     say(f"{name} with all numbers free")
     residuals = at_once(left, begins, case.workers)

@@ -6,16 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.diagnosis import candidates
-from surgisim.diagnosis.base import BOLD, bounded
+from surgisim.diagnosis.base import BOLD
 from surgisim.diagnosis.base_fit import without
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import IMPOSSIBLE, Law, beside, law_of, respond
+from surgisim.diagnosis.laws import IMPOSSIBLE, respond
 from surgisim.diagnosis.refine import refined
 
-SOFTER = (0.3, 0.1)
-"""Shares of the base's stiffness with which a law that tears it is tried."""
-NOTHING = Law({}, {}, None)
+BASES = 2
+"""Of those that fit once the law's response is taken off, how many a fit may begin with; with a heavy law all."""
 RUNS = 35
 """That fitting a law with everything about it free takes, roughly."""
 
@@ -50,52 +49,42 @@ class Refit:
 def refit(case, finding: Finding, evidence: float, z: np.ndarray, rounds: int = 3) -> Refit:
     """The law in the engine, its strength by secants of its response; what the tangent left out is put back.
 
-    Where the engine breaks down even in softer tissue, a weaker law is tried, then the tangent's word is taken.
+    Where the engine breaks down, a weaker law is tried, then the tangent's word is taken. A heavy law is tried without
+    its inertia too: it slows tissue, and a base that was fitted without it is not the one that it slows.
     """
-    base, until = case.base, case.clip.until
-    amplitude, gain, response = finding.amplitude.copy(), -np.inf, None
+    candidate, found = candidates.of(finding.hypothesis), []
+    for law in (candidate.law, candidate.light):
+        if law is not None:
+            found += _by_secants(case, finding, z, law, rounds)
+    if not found:
+        return Refit(finding, finding.amplitude, np.zeros_like(case.base.simulated), 0.0, -np.inf)
+    gain, amplitude, response = max(found, key=lambda f: f[0])
+    return Refit(finding, amplitude, response, gain, evidence + 0.5 * (gain - finding.gain))
+
+
+def _by_secants(case, finding: Finding, z: np.ndarray, law_of, rounds: int) -> list[tuple]:
+    """Gain, amplitude and response of the best strength; none where the engine breaks down."""
+    clip, base, until = case.clip, case.base, case.clip.until
+    amplitude, best = finding.amplitude.copy(), []
     for _ in range(rounds):
-        change = added(case, finding.hypothesis, amplitude)
-        if change is None:
+        try:
+            moved = respond(clip, base, law_of(finding.hypothesis, amplitude, clip), case.memo)
+        except IMPOSSIBLE:
             amplitude = 0.5 * amplitude
             continue
+        change = moved - base.simulated
         white = case.whiten(change[:, :until])[:, None]
         G, b = float(case.space.gram(white, white)[0, 0]), float(case.space.gram(white, z[:, None])[0, 0])
-        best = b / max(G, 1e-12)
+        times = b / max(G, 1e-12)
         # Near its best strength a response may be scaled; far from it, only another run tells.
-        scale = float(np.clip(best, 0.3, 1.4))
-        mine = 2 * scale * b - scale**2 * G
-        if mine > gain:
-            gain, response, kept = mine, scale * change, scale * amplitude
-        if abs(best - 1) < 0.1 or best <= 0:
+        scale = float(np.clip(times, 0.3, 1.4))
+        gain = 2 * scale * b - scale**2 * G
+        if not best or gain > best[0][0]:
+            best = [(gain, scale * amplitude, scale * change)]
+        if abs(times - 1) < 0.1 or times <= 0:
             break
-        amplitude = amplitude * float(np.clip(best, 0.4, 2.5))
-    if response is None:
-        return Refit(finding, finding.amplitude, np.zeros_like(base.simulated), 0.0, -np.inf)
-    return Refit(finding, kept, response, gain, evidence + 0.5 * (gain - finding.gain))
-
-
-def added(case, h: Hypothesis, amplitude: np.ndarray) -> np.ndarray | None:
-    """What a law adds to the base over the whole clip [m], (K, T, 3); None where the engine breaks down.
-
-    A base that was fitted without a law may be many times too stiff. A weight that pulls as far in tissue like that is
-    so heavy that its inertia tears it: there it is tried in softer tissue, as much lighter.
-    """
-    clip, base, memo = case.clip, case.base, case.memo
-    try:
-        return respond(clip, base, law_of(h, amplitude, clip), memo) - base.simulated
-    except IMPOSSIBLE:
-        if candidates.of(h).beside is None:
-            return None
-    for share in SOFTER:
-        x = bounded(base.x[:3] + np.array([np.log(share), 0.0, 0.0]), clip)
-        softer = replace(base, x=np.concatenate([x, base.x[3:]]))
-        try:
-            law = law_of(*beside(h, amplitude, float(np.exp(x[0] - base.x[0]))), clip)
-            return respond(clip, softer, law, memo) - respond(clip, softer, NOTHING, memo)
-        except IMPOSSIBLE:
-            continue
-    return None
+        amplitude = amplitude * float(np.clip(times, 0.4, 2.5))
+    return best
 
 
 def freed(case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
@@ -104,8 +93,10 @@ def freed(case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
     Its gain is never less than before: there the base moved along its tangent, which takes more than tissue gives.
     """
     say(f"the base beside {one.term}")
-    base_at, aside = without(case, one.response, say)
-    found = refined(case, z, [(one.finding.hypothesis, one.amplitude)], one.response, say, base_at)
+    bases, aside = without(case, one.response, say)
+    if candidates.of(one.finding.hypothesis).light is None:
+        bases = bases[:BASES]
+    found = refined(case, z, [(one.finding.hypothesis, one.amplitude)], one.response, say, bases)
     if found is None:
         return one
     (hypothesis, amplitude), gain = found.laws[0], max(found.gain, one.gain)

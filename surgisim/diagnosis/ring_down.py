@@ -188,12 +188,6 @@ class RingDown:
             going = single[:keep]
         return sorted(ended, key=lambda d: d.cost)
 
-    def best(self, say: Callable[[str], None]) -> tuple[np.ndarray, np.ndarray]:
-        """The best body, or a softer one that fits as well, (3 + R,), and how far others about as good are, (3,)."""
-        ends = self.descents(say)
-        chosen = min((d for d in ends if d.cost < ends[0].cost + ALIKE), key=lambda d: d.y[0])
-        return chosen.y, apart(chosen, ends)
-
     def descend(self, at: Descent, say: Callable[[str], None], steps: int = DESCENTS) -> None:
         """Levenberg-Marquardt, some steps on."""
         for _ in range(steps):
@@ -226,6 +220,11 @@ class RingDown:
                     return True
                 more *= 8
         return False
+
+
+def softest(ends: list[Descent]) -> Descent:
+    """The best of descents, or a softer one that fits as well."""
+    return min((d for d in ends if d.cost < ends[0].cost + ALIKE), key=lambda d: d.y[0])
 
 
 def apart(chosen: Descent, ends: list[Descent]) -> np.ndarray:

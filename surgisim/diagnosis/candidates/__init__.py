@@ -46,6 +46,11 @@ def blocks(clip: Clip, base: Base, memo: Memo, only: np.ndarray | None = None) -
     return _parts(look, [c.tried for c in catalogue().values()])
 
 
+def of_law(term: str, clip: Clip, base: Base, memo: Memo) -> Parts:
+    """All that is tried of one law and is cheap."""
+    return _parts(Look(clip, base, memo), [catalogue()[term].tried])
+
+
 def costly(clip: Clip, base: Base, memo: Memo, workers: int) -> Parts:
     """What only runs of the engine can tell; tried where something is to be told."""
     look = Look(clip, base, memo, workers=workers)

@@ -18,9 +18,15 @@ NAME, WEIGHT = "added_mass", "hidden_contact"
 
 
 def law(h, amplitude, clip) -> Law:
-    a = float(amplitude[0])
-    pull = pushes.push(a * h.about["down"], h.onset, None)
-    return Law({NAME: {"mass": abs(a) / 9.81}, WEIGHT: pull}, {NAME: h.place, WEIGHT: h.place})
+    pull = light(h, amplitude, clip)
+    mass = {"mass": abs(float(amplitude[0])) / 9.81}
+    return Law({NAME: mass, **pull.values}, {NAME: h.place, **pull.places})
+
+
+def light(h, amplitude, clip) -> Law:
+    """Its pull alone."""
+    pull = pushes.push(float(amplitude[0]) * h.about["down"], h.onset, None)
+    return Law({WEIGHT: pull}, {WEIGHT: h.place})
 
 
 def _block(look: Look, place: Place, begins: np.ndarray) -> Block:
@@ -46,6 +52,7 @@ def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:
 
 CANDIDATE = Candidate(
     law=law,
+    light=light,
     tried=tried,
     finer=finer,
     knobs=lambda h, a: [*knobs.strength(h, a), *knobs.place(h), *knobs.moment(h, "onset")],
