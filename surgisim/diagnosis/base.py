@@ -35,6 +35,26 @@ SAFETY."""
 
 
 @dataclass(frozen=True)
+class Known:
+    """How surely a base's numbers are known."""
+
+    near: np.ndarray
+    """Posterior covariance about them, (3, 3)."""
+    aside: np.ndarray
+    """How far from them other bodies lie that fit about as well, drawn as often as they do, (D, 3)."""
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Standard deviation, (3,)."""
+        return np.sqrt(np.diag(self.near) + (self.aside**2).mean(0))
+
+    def draws(self, x: np.ndarray) -> np.ndarray:
+        """Numbers that would do, (D, 3)."""
+        near = np.random.default_rng(len(self.aside)).multivariate_normal(np.zeros(3), self.near, len(self.aside))
+        return x[:3] + near + self.aside
+
+
+@dataclass(frozen=True)
 class Base:
     x: np.ndarray
     """(3,)"""
@@ -46,12 +66,14 @@ class Base:
     tangent: Tangent
     slopes: np.ndarray
     """Of the points by x, at one prior standard deviation [m], (3, K, T_fit, 3)."""
-    spread: np.ndarray
-    """Posterior standard deviation of x, (3,)."""
-    aside: np.ndarray
-    """Standard deviation of x among other bodies that fit about as well, (3,): part of `spread`."""
+    known: Known
     bound: tuple[str, ...] = ()
     """Numbers that came to the end of what is tried: the recording does not tell them."""
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Posterior standard deviation of x, (3,)."""
+        return self.known.spread
 
     @property
     def values(self) -> Values:

@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from surgisim.diagnosis import calibration
-from surgisim.diagnosis.base import SPREAD, START, TERMS, Base, at_bound, bounded, carried, simulate, values_of
+from surgisim.diagnosis.base import SPREAD, START, TERMS, Base, Known, at_bound, bounded, carried, simulate, values_of
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Whitener
-from surgisim.diagnosis.ring_down import ASIDE, RingDown, apart, softest, told
+from surgisim.diagnosis.ring_down import ASIDE, DRAWS, Descent, RingDown, aside, softest, told
 from surgisim.diagnosis.tangent import Tangent, base_piola, tangent
 from surgisim.mpm.setup import Prepared
 from surgisim.mpm.simulator import Breakdown
@@ -45,7 +45,7 @@ def fit_base(
     """
     late = [float(clip.opening[j, t]) for j, t in clip.releases()] if timing else []
     y, promised = np.concatenate([START if begun is None else begun.x, late]), np.inf
-    aside = np.zeros(3) if begun is None else begun.aside
+    others = np.zeros((DRAWS, 3)) if begun is None else begun.known.aside
     bodies = [clip.prepared(TERMS) for _ in range(workers)]
     prepared = bodies[0]
     carry = prepared.simulator.carry(clip.rest)
@@ -70,16 +70,15 @@ def fit_base(
                 break
         if n == 0 and begun is None:
             ends = around.descents(say)
-            chosen = softest(ends)
-            y, aside = chosen.y, apart(chosen, ends)
+            y, others = softest(ends).y, aside(ends)
         else:
             y = _on(around, y, say)
         promised = around.cost(y, around.left(y))
     slopes = around.slopes(y)
-    spread = np.sqrt(np.diag(np.linalg.inv(around.normal(slopes))))[:3]
+    known = Known(np.linalg.inv(around.normal(slopes))[:3, :3], others)
     x = y[:3]
     units = slopes[:3] * SPREAD[:, None, None, None]
-    return clip, Base(x, prepared, drive, run, simulated, near, units, spread, aside, at_bound(x, clip))
+    return clip, Base(x, prepared, drive, run, simulated, near, units, known, at_bound(x, clip))
 
 
 def _on(around: RingDown, y: np.ndarray, say: Callable[[str], None]) -> np.ndarray:
@@ -89,11 +88,10 @@ def _on(around: RingDown, y: np.ndarray, say: Callable[[str], None]) -> np.ndarr
     return at.y
 
 
-def without(case, response: np.ndarray, say: Callable[[str], None]) -> tuple[list[np.ndarray], np.ndarray]:
-    """Bases of a `diagnose.Case` once a law's response over the whole clip [m], (K, T, 3), is taken off.
+def without(case, response: np.ndarray, say: Callable[[str], None]) -> list[Descent]:
+    """Bases of a `diagnose.Case` once a law's response over the whole clip [m], (K, T, 3), is taken off, best first.
 
-    Numbers and moments of release, (3 + R,), of the best and of where other descents got to, and how far those about
-    as good are from the best, (3,). Where something is hidden,
+    Where something is hidden,
     a base makes up for it with numbers that no step from there leads back from.
     """
     clip, base, until = case.clip, case.base, case.clip.until
@@ -104,9 +102,7 @@ def without(case, response: np.ndarray, say: Callable[[str], None]) -> tuple[lis
         rest, case.whiten, case.beside_base, case.memo, bodies, base.prepared.simulator.carry(clip.rest),
         np.concatenate([base.x, late]), base.run, base.simulated[:, :until], base.slopes[1] / SPREAD[1],
     )  # fmt: skip
-    ends = around.descents(say)
-    chosen = softest(ends)
-    return [chosen.y, *(d.y for d in ends if d is not chosen)], apart(chosen, ends)
+    return around.descents(say)
 
 
 def settled(clip: Clip, whiten: Whitener, space: Metric, slopes: slice, base: Base, memo: Memo) -> Base:
@@ -141,9 +137,9 @@ def settled(clip: Clip, whiten: Whitener, space: Metric, slopes: slice, base: Ba
         found = replace(found, tangent=near)
     open_to = np.linalg.inv(np.eye(space.columns.shape[1]) + (space.columns.T @ space.columns).astype(float))
     # As uncertain as a verdict takes evidence to be: what grid and mesh still have wrong is alike in many samples.
-    told = (1 / np.diag(open_to)[slopes] - 1) / calibration.TEMPERATURE
-    spread = np.sqrt(SPREAD**2 / (1 + told) + base.aside**2)
-    return replace(found, spread=spread, bound=at_bound(found.x, clip))
+    told = (np.linalg.inv(open_to[slopes, slopes]) - np.eye(3)) / calibration.TEMPERATURE
+    near = np.linalg.inv(np.eye(3) + told) * np.outer(SPREAD, SPREAD)
+    return replace(found, known=replace(base.known, near=near), bound=at_bound(found.x, clip))
 
 
 def _standing(prepared: Prepared, clip: Clip, x: np.ndarray, memo: Memo, frames: int):

@@ -47,7 +47,8 @@ class Case:
         times, columns = size / self.drift, self.space.columns.copy()
         columns[:, span(self.groups, "drift")] *= times
         groups = [replace(g, columns=times * g.columns) if g.name == "drift" else g for g in self.groups]
-        return replace(self, space=metric(columns), groups=groups, drift=size)
+        space = metric(columns)
+        return replace(self, space=space, groups=groups, drift=size, nulls=nulls(space, self.whiten, self.settings))
 
     @property
     def misfit(self) -> float:
@@ -90,6 +91,11 @@ class Case:
     def workers(self) -> int:
         """Runs side by side."""
         return workers(self.clip, self.settings)
+
+
+def nulls(space: Metric, whiten: Whitener, settings: Diagnosing) -> np.ndarray:
+    """Whitened residuals of nothing but noise and nuisances, (N, D)."""
+    return space.draw(np.random.default_rng(settings.seed), settings.nulls, whiten.known)
 
 
 def workers(clip: Clip, settings: Diagnosing) -> int:

@@ -14,7 +14,7 @@ from surgisim.diagnosis.base import HELD, Base
 from surgisim.diagnosis.base_fit import fit_base, settled
 from surgisim.diagnosis.candidates import Parts, blocks, costly, finer, of_law
 from surgisim.diagnosis.clip import Clip, clip_of
-from surgisim.diagnosis.context import Case, workers
+from surgisim.diagnosis.context import Case, nulls, workers
 from surgisim.diagnosis.evidence import Finding, Score, Scores, by_law, highest, judge
 from surgisim.diagnosis.joint import Joint, fit_jointly, needed
 from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
@@ -208,8 +208,8 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     slopes = slice(fixed.shape[1], fixed.shape[1] + len(base.slopes))
     base = settled(clip, whiten, space, slopes, base, memo)
     z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
-    nulls = space.draw(np.random.default_rng(settings.seed), settings.nulls, whiten.known)
-    return Case(clip, settings, noise, whiten, base, space, memo, z, nulls, slopes, groups, drift)
+    drawn = nulls(space, whiten, settings)
+    return Case(clip, settings, noise, whiten, base, space, memo, z, drawn, slopes, groups, drift)
 
 
 def whitened(whiten: Whitener, groups: list[Group], until: int) -> np.ndarray:

@@ -100,17 +100,16 @@ def _freed(case, refits: list, say) -> list[Joint]:
     except Clash:
         return []
     bases = [] if refits[0].x is None else [refits[0].x]
-    found = refined(case, case.z, starts, sum(r.response for r in refits), say, bases)
+    found = refined(case, case.z, starts, sum(r.response for r in refits), say, bases, refits[0].begun)
     if found is None:
         return []
-    spread = found.spread if refits[0].spread is None else np.maximum(found.spread, refits[0].spread)
     mine = [
         replace(
             r,
             finding=replace(r.finding, hypothesis=h),
             amplitude=amplitude,
             x=found.x,
-            spread=spread,
+            known=found.known,
             draws=tuple(draws),
         )
         for r, (h, amplitude), draws in zip(refits, found.laws, found.draws, strict=True)

@@ -6,23 +6,22 @@ import numpy as np
 
 from surgisim.artifacts.physics import Physics
 from surgisim.diagnosis import candidates
+from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.laws import law_of, steps
 from surgisim.physics.catalogue import choose
 
 
-def base_numbers(base) -> dict:
+def base_numbers(base: Base) -> dict:
     """E, nu and eta with 90 % intervals."""
-    E, nu, lag = float(np.exp(base.x[0])), float(base.x[1]), float(np.exp(base.x[2]))
-    s = 1.645 * base.spread
+
+    def numbers(x: np.ndarray) -> np.ndarray:
+        return np.stack([np.exp(x[..., 0]), x[..., 1], np.exp(x[..., 0] + x[..., 2])], -1)
+
+    best, ends = numbers(base.x[:3]), np.quantile(numbers(base.known.draws(base.x)), [0.05, 0.95], axis=0)
+    told = zip(("E", "nu", "eta"), ("Pa", "1", "Pa s"), best, ends[0], ends[1], strict=True)
     return {
-        "E": {"value": E, "low": E * float(np.exp(-s[0])), "high": E * float(np.exp(s[0])), "unit": "Pa"},
-        "nu": {"value": nu, "low": nu - float(s[1]), "high": nu + float(s[1]), "unit": "1"},
-        "eta": {
-            "value": E * lag,
-            "low": E * lag * float(np.exp(-s[2])),
-            "high": E * lag * float(np.exp(s[2])),
-            "unit": "Pa s",
-        },
+        name: {"value": float(v), "low": float(min(low, v)), "high": float(max(high, v)), "unit": unit}
+        for name, unit, v, low, high in told
     }
 
 
@@ -30,7 +29,7 @@ def physics(case, refits) -> Physics:
     """The base's laws and the named ones, with the grid and a stable step."""
     clip, base = case.clip, case.base
     if refits and refits[0].x is not None:
-        base = replace(base, x=refits[0].x[:3], spread=base.spread if refits[0].spread is None else refits[0].spread)
+        base = replace(base, x=refits[0].x[:3], known=refits[0].known or base.known)
     values, where, known = dict(base.values), {}, base_numbers(base)
     for r in refits:
         h, law = r.finding.hypothesis, law_of(r.finding.hypothesis, r.amplitude, clip)

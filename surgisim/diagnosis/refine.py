@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.diagnosis import calibration, candidates
-from surgisim.diagnosis.base import SPREAD, START, bounded
+from surgisim.diagnosis.base import SPREAD, START, Known, bounded
 from surgisim.diagnosis.clip import OPENS
 from surgisim.diagnosis.knobs import Start, turned
 from surgisim.diagnosis.laws import IMPOSSIBLE, Law, beside, joined, law_of, respond
-from surgisim.diagnosis.ring_down import EARLIEST, LATE, LATEST
+from surgisim.diagnosis.ring_down import DRAWS, EARLIEST, LATE, LATEST, Descent, aside
 from surgisim.estimation.trial import at_once
 
 STEP = 0.3
@@ -29,8 +29,6 @@ ROUNDS, FRESH = 8, 2
 DONE, LITTLE, FAR = 0.004, 3.0, 0.15
 """Share of the whole gain, and chi square, below which a step is the last; share beyond which the next one takes
 differences afresh."""
-DRAWS = 200
-"""From the posterior, which intervals are read off."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +38,8 @@ class Refined:
     """The same laws, drawn from their posterior: a list for each."""
     x: np.ndarray
     """The base that goes with it and its moments of release, (3 + R,)."""
-    spread: np.ndarray
-    """Posterior standard deviation of E, nu and eta, (3,)."""
+    known: Known
+    """How surely."""
     response: np.ndarray
     """What the laws and their own base add to the base over the whole clip [m], (K, T, 3)."""
     gain: float
@@ -50,12 +48,12 @@ class Refined:
 
 def refined(
     case, z: np.ndarray, starts: Sequence[Start], response: np.ndarray, say: Callable[[str], None],
-    bases_at: Sequence[np.ndarray] = (),
+    bases_at: Sequence[np.ndarray] = (), begun: Sequence[Descent] = (),
 ) -> Refined | None:  # fmt: skip
     """The best laws near `starts`, whose response together [m], (K, T, 3), is known.
 
-    case: a `diagnose.Case`; z: whitened residual of the base, (N,); bases_at: bases to begin with as well, (3 + R,)
-    each.
+    case: a `diagnose.Case`; z: whitened residual of the base, (N,); bases_at:
+    bases to begin with as well, (3 + R,) each; begun: where bases got to beside that response.
     None where the engine breaks down at the start.
     """
     clip, base, whiten, until = case.clip, case.base, case.whiten, case.clip.until
@@ -147,6 +145,9 @@ def refined(
     heat = calibration.TEMPERATURE + calibration.MISFIT * max(nothing - best, 0.0)
     spread = np.linalg.inv((normal - np.eye(len(x))) / heat + np.eye(len(x)))
     rng = np.random.default_rng([case.settings.seed, 3])
-    draws = [all_turned(near)[0] for near in rng.multivariate_normal(x, spread, DRAWS)]
-    laws, near = [list(d) for d in zip(*draws, strict=True)], np.sqrt(np.diag(spread)[own : own + 3]) * SPREAD
-    return Refined(all_turned(x)[0], laws, there, near, response, nothing - best)
+    near = rng.multivariate_normal(x, spread, DRAWS)
+    others = aside(begun, heat) if begun else np.zeros((DRAWS, 3))
+    near[:, own : own + 3] += others / SPREAD
+    laws = [list(d) for d in zip(*(all_turned(one)[0] for one in near), strict=True)]
+    known = Known(spread[own : own + 3, own : own + 3] * np.outer(SPREAD, SPREAD), others)
+    return Refined(all_turned(x)[0], laws, there, known, response, nothing - best)

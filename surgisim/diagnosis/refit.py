@@ -6,15 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.diagnosis import candidates
-from surgisim.diagnosis.base import BOLD
+from surgisim.diagnosis.base import BOLD, Known
 from surgisim.diagnosis.base_fit import without
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.laws import IMPOSSIBLE, respond
 from surgisim.diagnosis.refine import refined
+from surgisim.diagnosis.ring_down import Descent
 
 BASES = 2
-"""Of those that fit once the law's response is taken off, how many a fit may begin with; with a heavy law all."""
+"""Of those that fit beside a law's response, how many its fit begins with; with a heavy law all."""
 RUNS = 35
 """That fitting a law with everything about it free takes, roughly."""
 
@@ -31,10 +32,12 @@ class Refit:
     log_evidence: float
     x: np.ndarray | None = None
     """The base that was fitted with it, and its moments of release, (3 + R,); None where the base stayed."""
-    spread: np.ndarray | None = None
-    """Posterior standard deviation of that base's numbers, (3,)."""
+    known: Known | None = None
+    """How surely."""
     draws: tuple[tuple[Hypothesis, np.ndarray], ...] = ()
     """The law with other numbers that would do, drawn from its posterior; none where it was not fitted freely."""
+    begun: tuple[Descent, ...] = ()
+    """Where bases got to beside it."""
 
     @property
     def term(self) -> str:
@@ -93,17 +96,18 @@ def freed(case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
     Its gain is never less than before: there the base moved along its tangent, which takes more than tissue gives.
     """
     say(f"the base beside {one.term}")
-    bases, aside = without(case, one.response, say)
-    if candidates.of(one.finding.hypothesis).light is None:
-        bases = bases[:BASES]
-    found = refined(case, z, [(one.finding.hypothesis, one.amplitude)], one.response, say, bases)
+    start, heavy = (one.finding.hypothesis, one.amplitude), candidates.of(one.finding.hypothesis).light is not None
+    begun = without(case, one.response, say)
+    bases = [d.y for d in begun[: None if heavy else BASES]]
+    found = refined(case, z, [start], one.response, say, bases, begun)
     if found is None:
         return one
     (hypothesis, amplitude), gain = found.laws[0], max(found.gain, one.gain)
     evidence = one.log_evidence + 0.5 * (gain - one.gain)
     finding = replace(one.finding, hypothesis=hypothesis)
-    spread = np.hypot(found.spread, aside)
-    return Refit(finding, amplitude, found.response, gain, evidence, found.x, spread, tuple(found.draws[0]))
+    return Refit(
+        finding, amplitude, found.response, gain, evidence, found.x, found.known, tuple(found.draws[0]), tuple(begun)
+    )
 
 
 def fit_of_a_law(case) -> float:

@@ -42,6 +42,8 @@ SAME = 0.1
 ALIKE = 2.0
 """What chi square a softer body may cost more. Tissue that creeps back tells eta / E alone: of bodies that look alike
 the softest takes the longest steps."""
+DRAWS = 400
+"""Of bodies that would do."""
 ASIDE = 0.05
 """Share of what a base leaves unexplained, noise aside, below which nothing about it is worth another step: where
 something is hidden no base fits, and its numbers are fitted again with every law."""
@@ -227,13 +229,16 @@ def softest(ends: list[Descent]) -> Descent:
     return min((d for d in ends if d.cost < ends[0].cost + ALIKE), key=lambda d: d.y[0])
 
 
-def apart(chosen: Descent, ends: list[Descent]) -> np.ndarray:
-    """Standard deviation of x, (3,), among descents about the chosen one, each as probable as its chi square says."""
-    off = np.array([d.cost - chosen.cost for d in ends])
-    # No surer than a verdict takes evidence to be: what grid and mesh still have wrong is alike in many samples.
-    weight = np.exp(-0.5 * np.maximum(off, 0) / calibration.TEMPERATURE)
-    away = np.stack([d.y[:3] - chosen.y[:3] for d in ends])
-    return np.sqrt((weight[:, None] * away**2).sum(0) / weight.sum())
+def aside(ends: list[Descent], heat: float = calibration.TEMPERATURE) -> np.ndarray:
+    """How far x is from the chosen body where descents ended, each drawn as often as its chi square says, (DRAWS, 3).
+
+    heat: by which chi square is divided; no surer than a verdict takes evidence to be: what grid and mesh still have
+    wrong is alike in many samples.
+    """
+    chosen = softest(ends)
+    weight = np.exp(-0.5 * np.maximum([d.cost - chosen.cost for d in ends], 0) / heat)
+    drawn = np.random.default_rng(0).choice(len(ends), DRAWS, p=weight / weight.sum())
+    return np.stack([d.y[:3] - chosen.y[:3] for d in ends])[drawn]
 
 
 def told(y: np.ndarray) -> str:

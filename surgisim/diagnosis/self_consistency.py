@@ -17,7 +17,7 @@ def drawn(case: Case, rng: np.random.Generator) -> np.ndarray:
     moved = base.simulated + case.noise.draw(clip.rest, clip.frames, rng)
     for group in case.groups:
         moved = moved + np.tensordot(rng.standard_normal(len(group.columns)), group.columns, (0, 0))
-    near = np.sqrt(np.maximum(base.spread**2 - base.aside**2, 0)) / SPREAD
+    near = np.sqrt(np.diag(base.known.near)) / SPREAD
     share = np.minimum(near, 1.0) * rng.standard_normal(len(base.slopes))
     moved[:, : clip.until] += np.tensordot(share, base.slopes, (0, 0))
     if case.settings.offsets:

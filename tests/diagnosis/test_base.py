@@ -1,7 +1,6 @@
 """The base's fit: stiffness, viscosity and the moment of a release together; of bodies that look alike the softest."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from planted import GRID, TRUE, case_of, memo_of, plain, recording
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import base_fit as fitting
 from surgisim.diagnosis import ring_down
-from surgisim.diagnosis.base import START, TERMS
+from surgisim.diagnosis.base import START, TERMS, Known
 from surgisim.diagnosis.calibration import TEMPERATURE
 from surgisim.diagnosis.clip import OPENS, clip_of
 from surgisim.diagnosis.diagnose import prepare_case
@@ -48,8 +47,7 @@ def test_ever_stiffer_bodies_are_tried_until_one_stands(monkeypatch):
 def test_of_bodies_that_look_alike_the_softest_is_taken(dearer, softest):
     soft, stiff = (START + by * np.eye(3)[0] for by in (-1.0, 1.0))
     ends = [ring_down.Descent(y, None, cost) for y, cost in ((stiff, 100.0), (soft, 100.0 + dearer))]
-    found, _ = ring_down.RingDown.best(SimpleNamespace(descents=lambda say: ends), lambda text: None)
-    assert found is (soft if softest else stiff)
+    assert ring_down.softest(ends).y is (soft if softest else stiff)
 
 
 def test_bodies_that_fit_about_as_well_are_part_of_how_surely_one_is_known():
@@ -57,11 +55,15 @@ def test_bodies_that_fit_about_as_well_are_part_of_how_surely_one_is_known():
     best = ring_down.Descent(soft, None, 100.0)
 
     def away(dearer: float) -> np.ndarray:
-        return ring_down.apart(best, [best, ring_down.Descent(stiff, None, 100.0 + dearer)])
+        return ring_down.aside([best, ring_down.Descent(stiff, None, 100.0 + dearer)])
 
-    assert away(0.0) == pytest.approx([np.sqrt(2.0), 0, 0])
-    assert away(2 * TEMPERATURE * np.log(3.0)) == pytest.approx([1.0, 0, 0])
-    assert away(1e3) == pytest.approx([0, 0, 0], abs=1e-9)
+    # As often as it is as probable, as far away as it is, and on its own side.
+    for dearer, often in ((0.0, 0.5), (2 * TEMPERATURE * np.log(3.0), 0.25), (1e3, 0.0)):
+        assert (away(dearer)[:, 0] == 2.0).mean() == pytest.approx(often, abs=0.07)
+        assert (away(dearer)[:, 0] >= 0).all()
+    known = Known(np.zeros((3, 3)), away(0.0))
+    assert known.spread == pytest.approx([np.sqrt(2.0), 0, 0], rel=0.1)
+    assert known.draws(soft) == pytest.approx(soft + known.aside)
 
 
 def test_a_base_is_fitted_anew_where_a_run_fits_worse_than_promised(monkeypatch):
@@ -93,10 +95,10 @@ def test_with_a_law_taken_off_the_base_is_found_again_from_far_off():
     response = 1e-3 * np.sin(np.linspace(0, np.pi, made.clip.frames))[None, :, None] * np.array([1.0, 0.5, 0.0])
     moved = made.clip.moved + response * made.clip.seen[..., None]
     case = replace(case, clip=replace(case.clip, moved=moved))
-    x, aside = fitting.without(case, response, lambda text: None)
-    assert (np.abs(x[:3] - made.base.x) < 2.5 * made.base.spread).all()
-    assert len(x) == 4
-    assert aside.shape == (3,)
+    ends = fitting.without(case, response, lambda text: None)
+    assert (np.abs(ends[0].y[:3] - made.base.x) < 2.5 * made.base.spread).all()
+    assert len(ends[0].y) == 4
+    assert [d.cost for d in ends] == sorted(d.cost for d in ends)
 
 
 def test_numbers_that_carry_moments_of_release_let_go_then():

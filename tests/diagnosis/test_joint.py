@@ -41,7 +41,7 @@ def test_laws_that_are_fitted_together_do_not_make_up_for_each_other(case):
     assert both.gain > apart.gain
     # Of a weight only its share of the stiffness is told.
     assert both.refits[0].amplitude * np.exp(TRUE[0] - both.x[0]) == pytest.approx(WEIGHT, abs=0.8)
-    assert abs(both.x[0] - TRUE[0]) < both.refits[0].spread[0]
+    assert abs(both.x[0] - TRUE[0]) < both.refits[0].known.spread[0]
     assert abs(both.refits[1].finding.hypothesis.about["axis"] @ AXIS) > np.cos(0.5 * TURN)
     assert len(both.refits[0].draws) == len(both.refits[1].draws) > 0
     assert any("gravity and fibre" in text for text in said)
