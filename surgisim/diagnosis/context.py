@@ -44,11 +44,15 @@ class Case:
 
     def drifting(self, size: float) -> "Case":
         """The same where the camera drifts so far over the clip [m]."""
-        times, columns = size / self.drift, self.space.columns.copy()
-        columns[:, span(self.groups, "drift")] *= times
-        groups = [replace(g, columns=times * g.columns) if g.name == "drift" else g for g in self.groups]
+        return replace(self.open_by("drift", size / self.drift), drift=size)
+
+    def open_by(self, name: str, times: float) -> "Case":
+        """The same with the prior of one kind of nuisance some times as wide."""
+        columns = self.space.columns.copy()
+        columns[:, span(self.groups, name)] *= times
+        groups = [g.wider(times) if g.name == name else g for g in self.groups]
         space = metric(columns)
-        return replace(self, space=space, groups=groups, drift=size, nulls=nulls(space, self.whiten, self.settings))
+        return replace(self, space=space, groups=groups, nulls=nulls(space, self.whiten, self.settings))
 
     @property
     def misfit(self) -> float:

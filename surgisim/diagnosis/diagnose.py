@@ -140,10 +140,10 @@ def steadied(case: Case, laws: Scores, progress: Progress) -> Case | None:
 
 
 def laid_anew(case: Case, laws: Scores, progress: Progress) -> Case | None:
-    """The case with what is held laid where it seems to end.
+    """The case with what is held laid where it seems to end, or surely near its box; None where it seems to end there.
 
-    None where that is near its box, or where the best law says more: what is held would make up for a law, and a soft
-    layer at the base for a plane that lies elsewhere.
+    Near its box is where the engine, or a law that says more, has it end: farther off its effect is not in proportion,
+    and would make up for a law. A soft layer at the base makes up for a plane that lies elsewhere.
     """
     space, top, rivals = case.space, max(laws, key=lambda term: laws[term].evidence), []
     if laws[top].evidence > calibration.THRESHOLD:
@@ -157,13 +157,13 @@ def laid_anew(case: Case, laws: Scores, progress: Progress) -> Case | None:
     off, least = next(((off, least) for off, least in rivals if abs(off) > nuisance.FAR_OFF), (0.0, 0.0))
     if off == 0.0:
         return None
-    # So far a plane's effect is not in proportion: what is held is laid anew.
     by = float(np.clip(off, -MOST_HELD, MOST_HELD))
+    near = case.open_by("held", nuisance.FAR_OFF / HELD / 2)
     try:
         moved = prepare_case(case.clip.laid(raised=by), case.settings, case.memo, progress, case.base)
     except (Problem, Breakdown):
-        return None
-    return moved if case.misfit - moved.misfit - (by / HELD) ** 2 > least else None
+        return near
+    return moved if case.misfit - moved.misfit - (by / HELD) ** 2 > least else near
 
 
 def hazy(case: Case, laws: Scores) -> bool:

@@ -20,7 +20,7 @@ from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint, least, prediction
 from surgisim.diagnosis.noise import Noise, estimate
 from surgisim.diagnosis.prospect import Gain
-from surgisim.diagnosis.refit import Refit
+from surgisim.diagnosis.refit import Refit, kept
 from surgisim.diagnosis.saturated import SmoothFit
 
 REASONS = ("named", "faint", "loose", "drawn", "little", "unconfirmed", "refuted", "beaten")
@@ -122,6 +122,19 @@ def explanations(case: Case, refits: list[Refit], fitted: Joint) -> list[Explana
 
 
 def _explanation(case: Case, fitted: Joint) -> Explanation:
+    """A law that frames held out refute in its own base may stand in the one that was fitted without it.
+
+    A law that does nothing there is then refuted by its base alone, which bore with what the law's form has wrong.
+    """
+    found, first = _judged_ahead(case, fitted), fitted.refits[0]
+    if not found.refuted or len(fitted.refits) > 1 or first.x is None:
+        return found
+    law = kept(case, first)
+    other = _judged_ahead(case, prediction(case, [law], case.base.simulated + law.response, None))
+    return found if other.refuted else other
+
+
+def _judged_ahead(case: Case, fitted: Joint) -> Explanation:
     ahead = None if case.prospect is None else case.prospect.gain(case.base.simulated, fitted.moved)
     out = max((out for out, _ in pushes(case.clip.recording, fitted.refits)), default=None)
     low, _ = bootstrap(case, case.base.simulated, fitted.moved)

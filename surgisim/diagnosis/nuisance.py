@@ -68,6 +68,9 @@ class Group:
     values: tuple[tuple[str, float, str], ...] = ()
     """Name, prior standard deviation and unit of each direction that a reader would ask for, in order."""
 
+    def wider(self, times: float) -> "Group":
+        return Group(self.name, times * self.columns, tuple((name, times * sd, unit) for name, sd, unit in self.values))
+
 
 def of_base(clip: Clip, simulated: np.ndarray, error: np.ndarray, drift: float, settings: Diagnosing) -> list[Group]:
     """What a base is fitted with. error: what a finer grid changes [m], (K, T, 3); drift: its size [m]."""
@@ -103,7 +106,8 @@ def span(groups: list[Group], name: str) -> slice:
 
 def likely_held(groups: list[Group], likely: np.ndarray) -> float:
     """How far beyond its box what is held seems to end [m]; likely: of all columns, the groups' first, (M,)."""
-    return HELD * float(likely[span(groups, "held")].sum())
+    mine = span(groups, "held")
+    return sum(g.values[0][1] * float(likely[mine.start]) for g in groups if g.name == "held")
 
 
 def positions(groups: list[Group], names: set[str]) -> list[int]:

@@ -10,7 +10,7 @@ from surgisim.diagnosis.base import BOLD, Known
 from surgisim.diagnosis.base_fit import without
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.laws import IMPOSSIBLE, respond
+from surgisim.diagnosis.laws import IMPOSSIBLE, beside, respond
 from surgisim.diagnosis.refine import refined
 from surgisim.diagnosis.ring_down import Descent
 
@@ -108,6 +108,13 @@ def freed(case, one: Refit, z: np.ndarray, say: Callable[[str], None]) -> Refit:
     return Refit(
         finding, amplitude, found.response, gain, evidence, found.x, found.known, tuple(found.draws[0]), tuple(begun)
     )
+
+
+def kept(case, one: Refit) -> Refit:
+    """A law with the numbers that were fitted with it, in the base that was fitted without it."""
+    h, amplitude = beside(one.finding.hypothesis, one.amplitude, float(np.exp(case.base.x[0] - one.x[0])))
+    finding = replace(one.finding, hypothesis=h, amplitude=amplitude, gain=one.gain)
+    return refit(case, finding, one.log_evidence, case.z)
 
 
 def fit_of_a_law(case) -> float:

@@ -16,7 +16,7 @@ GAIN = 300.0
 
 
 def laid(monkeypatch, evidence: float, alone: float, beside: float, better: float) -> float | None:
-    """How far up what is held is laid [mm]; None where it stays.
+    """How far up what is held is laid [mm], 0 where it stays near its box; None where it seems to end there.
 
     alone, beside: where what is held seems to end without the best law and beside it [mm]; better: chi square that
     laying it anew takes away.
@@ -44,9 +44,9 @@ def laid(monkeypatch, evidence: float, alone: float, beside: float, better: floa
     [
         (5.0, 2.0, 9.9, 50.0, 2.0),  # nothing is hidden: where it seems to end
         (5.0, 0.5, 9.9, 50.0, None),  # near its box
-        (5.0, 2.0, 9.9, 3.0, None),  # worth less than what so far a plane costs beforehand
+        (5.0, 2.0, 9.9, 3.0, 0.0),  # worth less than what so far a plane costs beforehand
         (5.0, -9.0, 0.0, 900.0, -4.0),  # never farther than MOST_HELD
-        (150.0, 2.0, 0.3, GAIN - 1, None),  # a law makes up for it
+        (150.0, 2.0, 0.3, GAIN - 1, 0.0),  # a law makes up for it
         (150.0, 2.0, 0.3, GAIN + 50, 2.0),  # it makes up for a law
         (150.0, 0.3, -1.5, 50.0, -1.5),  # a law hides it
         (150.0, 0.3, 0.3, 900.0, None),
@@ -55,3 +55,15 @@ def laid(monkeypatch, evidence: float, alone: float, beside: float, better: floa
 def test_what_is_held_is_laid_anew_where_no_law_says_more(monkeypatch, evidence, alone, beside, better, raised):
     found = laid(monkeypatch, evidence, alone, beside, better)
     assert found == (None if raised is None else pytest.approx(raised))
+
+
+def test_what_is_held_near_its_box_ends_there_more_surely_and_nulls_know():
+    case = plain()
+    near = case.open_by("held", 0.4)
+    mine = nuisance.span(case.groups, "held")
+    assert mine.stop - mine.start == 1
+    assert near.space.columns[:, mine] == pytest.approx(0.4 * case.space.columns[:, mine])
+    assert near.misfit > case.misfit
+    off = nuisance.likely_held(near.groups, near.space.likely(near.z))
+    assert abs(off) < abs(nuisance.likely_held(case.groups, case.space.likely(case.z)))
+    assert (near.nulls != case.nulls).any()
