@@ -24,10 +24,11 @@ MISFIT = 0.05
 """Share of the explained chi square that signatures of the right law leave wrong."""
 EXPLAINED = 0.55
 """Share of the explainable misfit that a law must explain to be named."""
-RIVAL = 0.5
-"""Share of the best law's gain beyond which the engine runs another law too."""
-CLOSE = 0.5
-"""Share of the best law's gain, as the engine ran both, beyond which a law is fitted with everything free too."""
+RIVAL = 0.35
+"""Share of the best law's gain beyond which the engine runs another law too; chosen: a tangent is wrong by as much for
+what is stiff."""
+CLOSE = 0.4
+"""Share of the best law's gain, as the engine ran both, beyond which a law is fitted with everything free too; chosen."""
 SECOND = 0.5
 """Share of what a first law leaves of it that a second law must explain, both fitted together."""
 RUNNER_UP = 0.9
