@@ -28,7 +28,7 @@ RIVAL = 0.35
 """Share of the best law's gain beyond which the engine runs another law too; chosen: a tangent is wrong by as much for
 what is stiff."""
 CLOSE = 0.4
-"""Share of the best law's gain, as the engine ran both, beyond which a law is fitted with everything free too; chosen."""
+"""Share of the best law's gain, as the engine ran both, beyond which a law is fitted with everything free; chosen."""
 SECOND = 0.5
 """Share of what a first law leaves of it that a second law must explain, both fitted together."""
 RUNNER_UP = 0.9
