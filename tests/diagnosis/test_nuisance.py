@@ -1,6 +1,7 @@
 """What a recording leaves open explains itself; noise and nuisances drawn from the model fit it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,10 @@ from planted import plain
 from scipy.stats import chi2
 
 from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis import diagnose, nuisance
 from surgisim.diagnosis.diagnose import whitened
+from surgisim.diagnosis.evidence import Finding, Score
+from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.left_open import drifted, nuisances, told
 from surgisim.diagnosis.metric import metric
 from surgisim.diagnosis.noise import whitener
@@ -109,3 +113,31 @@ def test_what_a_case_draws_is_like_its_recording(case):
         ahead.append(case.prospect.misfit(moved - case.base.simulated).sum() / freedom[1])
     assert np.mean(fitted) == pytest.approx(1.0, abs=0.05)
     assert np.mean(ahead) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("left", "evidence", "steadier"), [(0.2, 90.0, True), (0.95, 90.0, False), (0.2, 5.0, False)])
+def test_a_drift_and_a_law_that_moves_tissue_at_rest_are_weighed_together(monkeypatch, left, evidence, steadier):
+    case = plain().drifting(2e-3)
+    finding = Finding(
+        Hypothesis("respiration", np.eye(1)), evidence, np.ones(1), np.ones(1), 90.0, np.zeros(1), 0, 1e-4
+    )
+    law = SimpleNamespace(response=np.zeros_like(case.clip.moved))
+    monkeypatch.setattr(diagnose, "refit", lambda *_: law)
+    monkeypatch.setattr(diagnose, "search", lambda *_: [finding])
+    monkeypatch.setattr(nuisance, "drift_of", lambda *_: left * case.drift)
+    found = diagnose.steadied(case, {"respiration": Score(evidence, np.zeros(1), [finding])}, lambda *_: None)
+    if not steadier:
+        assert found is None
+        return
+    # Nothing drifts there: the likelihood of the fitted frames says so, and nulls and columns follow.
+    assert found.drift < 0.1 * case.drift
+    mine = nuisance.span(case.groups, "drift")
+    assert found.space.columns[:, mine] * case.drift == pytest.approx(
+        case.space.columns[:, mine] * found.drift, rel=1e-4
+    )
+    assert (found.nulls**2).sum() < (case.nulls**2).sum()
+
+
+def test_the_log_determinant_of_a_metric_is_that_of_its_covariance():
+    U = np.random.default_rng(0).normal(size=(7, 3))
+    assert metric(U).log_det == pytest.approx(np.linalg.slogdet(np.eye(7) + U @ U.T)[1], rel=1e-5)
