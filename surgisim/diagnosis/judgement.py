@@ -41,6 +41,8 @@ class Explanation:
     """How far a push among its laws points out of the tissue (contact.py); None without one."""
     falls: bool = False
     """Whether the plain error of the frames held out falls with it by more than its interval."""
+    rises: bool = False
+    """Whether it rises by more than that."""
 
     @property
     def first(self) -> Refit:
@@ -69,7 +71,8 @@ class Explanation:
 
     @property
     def refuted(self) -> bool:
-        return self.ahead is not None and self.ahead.refuted
+        """By their likelihood, or by their plain error."""
+        return self.rises or (self.ahead is not None and self.ahead.refuted)
 
     @property
     def confirmed(self) -> bool:
@@ -122,7 +125,7 @@ def explanations(case: Case, refits: list[Refit], fitted: Joint) -> list[Explana
 
 
 def _explanation(case: Case, fitted: Joint) -> Explanation:
-    """A law that frames held out refute in its own base may stand in the one that was fitted without it.
+    """A law that frames held out speak against in its own base may stand in the one that was fitted without it.
 
     A law that does nothing there is then refuted by its base alone, which bore with what the law's form has wrong.
     """
@@ -137,9 +140,9 @@ def _explanation(case: Case, fitted: Joint) -> Explanation:
 def _judged_ahead(case: Case, fitted: Joint) -> Explanation:
     ahead = None if case.prospect is None else case.prospect.gain(case.base.simulated, fitted.moved)
     out = max((out for out, _ in pushes(case.clip.recording, fitted.refits)), default=None)
-    low, _ = bootstrap(case, case.base.simulated, fitted.moved)
-    falls = low is not None and low > 0
-    return Explanation(fitted, fitted.refits[0].log_evidence, ahead, still(case, fitted.moved), out, falls)
+    low, high = bootstrap(case, case.base.simulated, fitted.moved)
+    falls, rises = low is not None and low > 0, high is not None and high < 0
+    return Explanation(fitted, fitted.refits[0].log_evidence, ahead, still(case, fitted.moved), out, falls, rises)
 
 
 def judged(
@@ -234,7 +237,9 @@ def _reason(case: Case, chosen: Explanation, chance: float, explained: float, to
     # What is not believed says that something is hidden only where that is certain.
     if chosen.refuted:
         return "refuted" if certain else "faint"
-    if evidence < calibration.THRESHOLD or explained < calibration.EXPLAINED:
+    # A smooth field follows what grid and mesh have wrong too: what frames held out confirm need not explain all of it.
+    much = explained >= calibration.EXPLAINED or (certain and chosen.confirmed and took >= calibration.TAKEN)
+    if evidence < calibration.THRESHOLD or not much:
         return "little" if certain else "faint"
     if chosen.visible and not chosen.confirmed:
         return "unconfirmed"

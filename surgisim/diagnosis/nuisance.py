@@ -19,6 +19,7 @@ from surgisim.diagnosis.noise import Noise, whitener
 from surgisim.diagnosis.ring_down import LATE, LATEST
 from surgisim.estimation.trial import at_once
 from surgisim.mpm.grip import runs
+from surgisim.mpm.setup import widened
 from surgisim.mpm.simulator import Breakdown
 from surgisim.problem import Problem
 
@@ -220,27 +221,29 @@ def held(clip: Clip) -> np.ndarray:
 
 def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group]:
     """Grips of another size or place, or that open sooner, and tissue of another elastic law, by the engine."""
-    motion, trials = clip.motion, []
+    motion, wide, trials = clip.motion, widened(clip.motion.radius, clip.body.spacing), []
     u, v = plane(clip)
     for j in range(len(motion.radius)):
         if not motion.active[j].any():
             continue
         one = np.eye(len(motion.radius))[j]
         shown = motion.active[j, : clip.until].any()
-        larger = replace(motion, radius=motion.radius * (1 + RADIUS * one))
-        trials.append(("grip radius", (f"radius of grip {j}", RADIUS, "1"), larger, None))
+        larger = replace(motion, radius=wide * (1 + RADIUS * one))
+        # A ball that the grid widens is wrong by that too.
+        sd = float(np.hypot(RADIUS, wide[j] / motion.radius[j] - 1))
+        trials.append(("grip radius", (f"radius of grip {j}", sd, "1"), larger, sd / RADIUS))
         for axis, way in (("u", u), ("v", v)) if shown else ():
             by = CENTRE * one[:, None] * way
             aside = replace(motion, center_rest=motion.center_rest + by, position=motion.position + by[:, None])
-            trials.append(("grip centre", (f"centre of grip {j} along {axis}", CENTRE, "m"), aside, None))
+            trials.append(("grip centre", (f"centre of grip {j} along {axis}", CENTRE, "m"), aside, 1.0))
     for j in np.flatnonzero(motion.active.any(1) & ~motion.active[:, : clip.until].any(1)):
         # Of grips that fitted frames show, the tangent says it (`firmness`).
         way = np.eye(len(motion.radius))[j][:, None, None] * (motion.position - motion.center_rest[:, None])
         further = replace(motion, position=motion.position + FIRM * way)
-        trials.append(("grip firmness", (f"firmness of grip {j}", FIRM, "1"), further, None))
+        trials.append(("grip firmness", (f"firmness of grip {j}", FIRM, "1"), further, 1.0))
     trials = [
-        (name, told, replace(clip, recording=replace(clip.recording, motion=m)), terms, 1.0)
-        for name, told, m, terms in trials
+        (name, told, replace(clip, recording=replace(clip.recording, motion=m)), None, times)
+        for name, told, m, times in trials
     ]
     trials += [("elastic law", (name, 1.0, "1"), clip, (name, "newtonian"), 1.0) for name in LAWS]
     for j, last in clip.releases(clip.frames - 1):

@@ -27,8 +27,9 @@ from surgisim.problem import Problem
 Values = dict[str, Numbers]
 """Law -> parameter -> value."""
 
-LEAST_GRIP = 1.0
-"""Smallest radius of a grip, in cells."""
+LEAST_GRIP, LEAST_SHARP = 1.0, 0.5
+"""Smallest radius of a grip, in cells: of one that splines alone carry, and of one at whose skin the displacement may
+bend (kink.py), which still holds a few particles then."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +87,8 @@ class Prepared:
         one that gives way a little is the better guess: held hard at the wrong place, a release fits a modulus many
         times too high.
 
-        A grip smaller than a cell is widened to one: the grid cannot carry a smaller ball along, and would let
-        the tissue slip out of it.
+        A grip smaller than a cell is widened to one where the body was laid without it (`prepare`): splines cannot
+        carry a smaller ball along, and would let the tissue slip out of it. Otherwise one of half a cell is carried.
         """
         spacing = self.simulator.grid.spacing
         laws = choose(self.terms)
@@ -96,7 +97,8 @@ class Prepared:
         base = {n: t.row(values[n]) for n, t in laws.items() if t.energy is not None and n not in local}
         alone = {n: laws[n] for n in base}
         shear, pressure = (of(alone, base, self.density) / spacing for of in (shear_speed, wave_speed))
-        motion = replace(motion, radius=np.maximum(motion.radius, LEAST_GRIP * spacing))
+        least = LEAST_SHARP if self.simulator.kinks.count else LEAST_GRIP
+        motion = replace(motion, radius=widened(motion.radius, spacing, least))
         held = self.body.held if held is None else held
         spring = (SHARP_ANCHOR if self.simulator.kinks.count else ANCHOR) * shear**2
         path = drive(
@@ -177,11 +179,15 @@ def prepare(
     }  # fmt: skip
     if form == "updated":
         return Prepared(Updated(**given), tuple(terms), density, body, places or {})
-    least = LEAST_GRIP * body.spacing
-    held = () if grips is None else zip(grips.center_rest, grips.radius, strict=True)
-    balls = tuple(Ball(np.asarray(c, float), max(float(r), least)) for c, r in held)
+    held = () if grips is None else zip(grips.center_rest, widened(grips.radius, body.spacing), strict=True)
+    balls = tuple(Ball(np.asarray(c, float), float(r)) for c, r in held)
     simulator = Simulator(**given, precision=precision, threads=threads, balls=balls)
     return Prepared(simulator, tuple(terms), density, body, places or {})
+
+
+def widened(radius: np.ndarray, spacing: float, least: float = LEAST_SHARP) -> np.ndarray:
+    """Radii of grips [m], (J,), as a grid of this spacing [m] carries them; least: in cells."""
+    return np.maximum(radius, least * spacing)
 
 
 def values_of(physics: Physics) -> Values:

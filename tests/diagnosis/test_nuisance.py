@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import diagnose, nuisance
+from surgisim.diagnosis.base import tracks_of
 from surgisim.diagnosis.diagnose import whitened
 from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
@@ -86,6 +87,16 @@ def test_a_nuisance_at_one_standard_deviation_is_explained_by_its_own_kind_alone
     beside, left = (np.diag(space.gram(columns, columns)) for space in (without, case.space))
     # One direction of unit variance leaves b / (1 + b) of a chi square of b: below 1, however large the nuisance is.
     assert (left <= 1.01 * beside / (1 + beside)).all()
+
+
+def test_a_grip_that_the_grid_widens_may_be_smaller_by_as_much(case):
+    clip = case.clip
+    motion = replace(clip.motion, radius=0.4 * clip.body.spacing * np.ones(len(clip.motion.radius)))
+    clip = replace(clip, recording=replace(clip.recording, motion=motion))
+    base = replace(case.base, simulated=tracks_of(clip, case.base.x, case.memo))
+    group = next(g for g in nuisance.other_bodies(clip, base, case.memo, 1) if g.name == "grip radius")
+    assert group.values[0][1] == pytest.approx(np.hypot(nuisance.RADIUS, 0.25))
+    assert np.abs(group.columns[0]).max() > 1e-4
 
 
 def test_a_camera_that_drifts_is_said(case):

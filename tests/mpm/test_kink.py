@@ -74,3 +74,18 @@ def test_the_adjoint_sees_the_kinks():
     along = rng.random(theta.shape) * theta * 1e-4
     up, down = (made.simulator.run(theta + s * along, path).u for s in (1, -1))
     assert (gradient * along).sum() == pytest.approx((c * (up - down)).sum() / 2, rel=1e-5)
+
+
+def test_a_grip_smaller_than_a_cell_carries_what_a_finer_grid_says():
+    motion, size = pulled(), (0.036, 0.03, 0.018)
+    line = motion.center_rest + np.array([1.6, 2.0, 2.5])[:, None] * motion.radius[0] * [1.0, 0, 0] + [0, 0, 1e-4]
+    found = []
+    for cells in (0.65, 1.6):
+        made = prepare(
+            slab(size=size, spacing=motion.radius[0] / cells), tuple(SOFT), density=1050.0, grips=motion, carried=line
+        )
+        path = made.drive(motion, SOFT, fps=FPS, per_frame=made.per_frame(SOFT, FPS))
+        found.append(made.simulator.carry(line) @ made.simulator.run(made.theta(SOFT), path).u[8].astype(float))
+    wanted = np.linalg.norm(motion.position[0, 8] - motion.center_rest[0])
+    # Widened to a cell it would be off by half of that.
+    assert np.abs(found[0] - found[1]).max() < 0.12 * wanted

@@ -77,7 +77,7 @@ modes around it ({100 * e["explained"]:.0f} % of the rest).
 
 **What does not hold.** Within 1.6 radii of the grip the engine is off by several tenths of a millimetre, where the
 strain is singular and the elements themselves are not settled either; there it falls hardly faster than the spacing. A
-grip smaller than a cell is carried as if it were as large as one. Rebounds are off by up to
+grip smaller than half a cell is carried as if it were as large as that. Rebounds are off by up to
 {100 * worst["late"]:.0f} %, most of them late: lumped nodal masses slow a quarter wave over three cells by 4 %.
 """
     return text
