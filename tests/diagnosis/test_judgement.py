@@ -114,7 +114,21 @@ def test_two_laws_named_together_are_no_class():
 )
 def test_what_explains_little_says_that_something_is_hidden_only_where_that_is_certain(evidence, overstretched, said):
     case = SimpleNamespace(settings=CASE.settings, overstretched=overstretched)
-    assert reason(explanation(evidence=evidence), explained=0.3, case=case) == said
+    assert reason(explanation(evidence=evidence, ahead=ALIKE), explained=0.3, case=case) == said
+
+
+@pytest.mark.parametrize(
+    ("evidence", "ahead", "took", "said"),
+    [(90, BETTER, 0.3, "named"), (90, BETTER, 0.1, "little"), (90, ALIKE, 0.3, "little"), (40, BETTER, 0.3, "faint")],
+)
+def test_what_frames_held_out_confirm_need_not_explain_all_that_a_smooth_field_does(evidence, ahead, took, said):
+    assert reason(explanation(evidence=evidence, ahead=ahead), explained=0.3, took=took) == said
+
+
+def test_a_plain_error_that_rises_refutes():
+    rising, confirmed = replace(explanation(), rises=True), explanation()
+    assert reason(rising) == "refuted"
+    assert stands([rising, confirmed]) is confirmed
 
 
 def two(more: int, chance: float, cos: float) -> tuple[Explanation, list[Explanation], dict[str, float]]:
@@ -138,7 +152,7 @@ def test_of_two_laws_that_do_the_same_the_simpler_comes_first(monkeypatch, more,
 
 
 def test_a_law_is_not_named_for_little():
-    assert reason(explanation(), explained=0.5) == "little"
+    assert reason(explanation(ahead=ALIKE), explained=0.5) == "little"
     assert reason(explanation(evidence=CLEAR - 1), took=0.1) == "faint"
     assert reason(explanation(evidence=CLEAR + 1), took=0.1) == "named"
     assert reason(explanation(evidence=CLEAR - 1), took=0.1, case=UNCALIBRATED) == "named"
