@@ -7,8 +7,8 @@ from pydantic import Field
 from surgisim.config.base import Settings
 
 Kinds = Literal[
-    "release", "held", "lag", "scale", "drift", "simulator", "grip radius", "grip centre", "grip firmness", "grip path",
-    "elastic law", "closing",
+    "release", "held", "lag", "scale", "drift", "place", "simulator", "grip radius", "grip centre", "grip firmness",
+    "grip path", "elastic law", "closing",
 ]  # fmt: skip
 """What a recording leaves open, by name."""
 

@@ -4,10 +4,11 @@ Its numbers x are log E, nu and log eta / E, and may be followed by the moments 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from surgisim.diagnosis import calibration
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.tangent import Tangent
@@ -25,6 +26,8 @@ LOW, HIGH = np.array([np.log(2e2), 0.30, np.log(5e-5)]), np.array([np.log(1e6), 
 NAMES = ("E", "nu", "eta / E")
 HELD = 1e-3
 """Standard deviation of where what is held ends [m]: nobody glues to the millimetre."""
+ASIDE = 0.05
+"""Of a cell: how far aside points are looked at for how displacement changes there."""
 SLOWER = 8
 """Times that viscosity may shorten the stable step of tissue of the usual stiffness (`mpm/stable.py`). To a base
 without memory, tissue that relaxes looks viscous without bound, and its runs would take minutes each."""
@@ -47,6 +50,12 @@ class Known:
     def spread(self) -> np.ndarray:
         """Standard deviation, (3,)."""
         return np.sqrt(np.diag(self.near) + (self.aside**2).mean(0))
+
+    def beside(self, left: float) -> "Known":
+        """The same where a law that nobody knows leaves so much chi square: its share of that is the numbers' too."""
+        surer, prior = np.linalg.inv(self.near), np.diag(SPREAD**-2)
+        less = calibration.TEMPERATURE / (calibration.TEMPERATURE + calibration.MISFIT * left)
+        return replace(self, near=np.linalg.inv(less * (surer - prior) + prior))
 
     def draws(self, x: np.ndarray) -> np.ndarray:
         """Numbers that would do, (D, 3)."""
@@ -109,6 +118,15 @@ def at_bound(x: np.ndarray, clip: Clip) -> tuple[str, ...]:
 def carried(carry, run: Run) -> np.ndarray:
     """Displacement of points [m], (K, T, 3)."""
     return np.stack([carry @ u.astype(float) for u in run.u], 1)
+
+
+def by_place(prepared: Prepared, clip: Clip, run: Run) -> np.ndarray:
+    """Derivative of the points' displacement by where each sits on the body, along each axis [1], (3, K, T, 3)."""
+    step, result = ASIDE * clip.body.spacing, []
+    for way in step * np.eye(3):
+        ahead, behind = (carried(prepared.simulator.carry(clip.rest + by), run) for by in (way, -way))
+        result.append((ahead - behind) / (2 * step))
+    return np.stack(result)
 
 
 def simulate(prepared: Prepared, clip: Clip, x: np.ndarray, memo: Memo, frames: int) -> tuple[Drive, Run]:

@@ -12,7 +12,19 @@ from dataclasses import replace
 import numpy as np
 
 from surgisim.diagnosis import calibration
-from surgisim.diagnosis.base import SPREAD, START, TERMS, Base, Known, at_bound, bounded, carried, simulate, values_of
+from surgisim.diagnosis.base import (
+    SPREAD,
+    START,
+    TERMS,
+    Base,
+    Known,
+    at_bound,
+    bounded,
+    by_place,
+    carried,
+    simulate,
+    values_of,
+)
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
@@ -30,16 +42,19 @@ none, in prior standard deviations."""
 STIFFER = np.log(3.0)
 """Step of log E where the body to begin with is torn apart."""
 
+Nuisances = Callable[[Clip, np.ndarray, np.ndarray, np.ndarray, bool], np.ndarray]
+"""Of a clip, a base's numbers (3,), its tracks [m], (K, T, 3), their derivative by where points sit [1], (3, K, T, 3),
+and whether these are a first guess: whatever else a residual may hold, whitened at one standard deviation, (N, M)."""
+
 
 def fit_base(
-    clip: Clip, whiten: Whitener, nuisances: Callable[[Clip, np.ndarray, np.ndarray, bool], np.ndarray], memo: Memo, *,
+    clip: Clip, whiten: Whitener, nuisances: Nuisances, memo: Memo, *,
     rounds: int = ROUNDS, workers: int = 1, timing: bool = True, begun: Base | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> tuple[Clip, Base]:  # fmt: skip
     """E, nu and eta, and when grips open; the clip with the latter, and the base.
 
-    nuisances: of a clip, a base's numbers (3,), its tracks [m], (K, T, 3), and whether these are a first guess,
-    whatever else a residual may hold, whitened at one standard deviation, (N, M). Begun anew, at most `rounds` times,
+    Begun anew, at most `rounds` times,
     where a run fits worse than the tangent and the short runs before it promised. timing: whether the moments of
     releases are free; begun: a base of nearly the same body.
     """
@@ -59,7 +74,8 @@ def fit_base(
         simulated = carried(carry, run)
         near = tangent(prepared, values_of(y[:3]), drive, run, clip.rest, clip.until)
         if n < 2:
-            space = metric(nuisances(clip, y[:3], simulated, n == 0 and begun is None))
+            sits = by_place(prepared, clip, run)
+            space = metric(nuisances(clip, y[:3], simulated, sits, n == 0 and begun is None))
         around = RingDown(
             clip, whiten, space, memo, bodies, carry, y.copy(), run, simulated[:, : clip.until],
             _by_poisson(prepared, near, y[:3]),

@@ -189,12 +189,12 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     whiten = whitener(noise, clip.rest, clip.seen[:, fitted], settings.offsets)
     drift = nuisance.drift_of(clip, noise, settings.offsets)
 
-    def beside(clip: Clip, x: np.ndarray, simulated: np.ndarray, first: bool) -> np.ndarray:
+    def beside(clip: Clip, x: np.ndarray, simulated: np.ndarray, sits: np.ndarray, first: bool) -> np.ndarray:
         error = nuisance.error_of(clip, x, simulated, memo, settings)
         if first:
             # How a body of other numbers rings says nothing of how this one does.
             error = error * nuisance.held(clip)[None, :, None]
-        groups = nuisance.of_base(clip, simulated, error, drift, settings)
+        groups = nuisance.of_base(clip, simulated, error, sits, drift, noise, settings)
         return whitened(whiten, groups, until)
 
     clip, base = fit_base(
@@ -202,7 +202,7 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
         begun=begun, say=lambda text: progress(0.1, 1, text),
     )  # fmt: skip
     error = nuisance.error_of(clip, base.x, base.simulated, memo, settings)
-    groups = nuisance.of_laws(clip, base, error, drift, memo, settings, workers(clip, settings))
+    groups = nuisance.of_laws(clip, base, error, drift, noise, memo, settings, workers(clip, settings))
     fixed = whitened(whiten, groups, until)
     space = metric(np.concatenate([fixed, whiten(base.slopes).T], 1))
     slopes = slice(fixed.shape[1], fixed.shape[1] + len(base.slopes))

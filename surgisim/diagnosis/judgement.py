@@ -23,7 +23,7 @@ from surgisim.diagnosis.prospect import Gain
 from surgisim.diagnosis.refit import Refit, kept
 from surgisim.diagnosis.saturated import SmoothFit
 
-REASONS = ("named", "faint", "loose", "drawn", "little", "unconfirmed", "refuted", "beaten")
+REASONS = ("named", "faint", "loose", "drawn", "little", "unfit", "unconfirmed", "refuted", "beaten")
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def judged(
     explained = float(np.clip(fitted.gain / total, 0, 1))
     noise = noise_beside(case, fitted.moved)
     took = taken(case, fitted.moved, noise.sigma)
-    reason = _reason(case, chosen, chances[term], explained, took, over)
+    reason = _reason(case, chosen, chances[term], explained, took, _unfit(case, fitted, noise), over)
     if worse and reason == "named":
         reason = "refuted"
     if reason == "faint":
@@ -224,7 +224,15 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
     return chosen
 
 
-def _reason(case: Case, chosen: Explanation, chance: float, explained: float, took: float, over: Gain | None) -> str:
+def _unfit(case: Case, fitted: Joint, noise: Noise) -> bool:
+    """Whether frames held out are farther off than a recording is beside what it holds."""
+    left = rms(case, fitted.moved)[1]
+    return left is not None and left > calibration.UNFIT * 1e3 * np.sqrt(3) * noise.sigma
+
+
+def _reason(
+    case: Case, chosen: Explanation, chance: float, explained: float, took: float, unfit: bool, over: Gain | None
+) -> str:
     """Why it is named, or not; chance: its probability among all laws."""
     evidence = chosen.log_evidence if case.settings.calibrated else np.inf
     certain = evidence >= calibration.CLEAR or case.overstretched
@@ -238,9 +246,11 @@ def _reason(case: Case, chosen: Explanation, chance: float, explained: float, to
     if chosen.refuted:
         return "refuted" if certain else "faint"
     # A smooth field follows what grid and mesh have wrong too: what frames held out confirm need not explain all of it.
-    much = explained >= calibration.EXPLAINED or (certain and chosen.confirmed and took >= calibration.TAKEN)
+    much = took >= calibration.TAKEN and (explained >= calibration.EXPLAINED or chosen.confirmed)
     if evidence < calibration.THRESHOLD or not much:
         return "little" if certain else "faint"
+    if unfit:
+        return "unfit" if certain else "faint"
     if chosen.visible and not chosen.confirmed:
         return "unconfirmed"
     if not chosen.visible and evidence < calibration.CLEAR and chance < calibration.SURE:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis.base import HELD, Base, by_held, tracks_of
+from surgisim.diagnosis.base import HELD, Base, by_held, by_place, tracks_of
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import hats, plane
 from surgisim.diagnosis.memo import Memo
@@ -35,6 +35,10 @@ WALKS = 3
 """Courses of a drift: the first of a random walk's (Karhunen and Loeve); the last goes to and fro 1.25 times."""
 LEAST_REST = 6
 """Frames of rest from which a drift is learned."""
+PLACE, SLIGHT, MOST_PLACES = 1.0, 1.0, 150
+"""Where a point sits on the body, over the noise of a frame: what a tracker has constantly wrong, no averaging takes
+off, and a mesh moves each point a little otherwise than tissue does. Directions are left out where a standard deviation
+is worth less chi square than SLIGHT, and beyond the first MOST_PLACES."""
 FIRM = 0.15
 """Of how much more or less than all of its path a grip carries along [1]."""
 RADIUS, HERE, CENTRE, PATH = 0.1, 1.0, 5e-4, 1e-4
@@ -73,21 +77,30 @@ class Group:
         return Group(self.name, times * self.columns, tuple((name, times * sd, unit) for name, sd, unit in self.values))
 
 
-def of_base(clip: Clip, simulated: np.ndarray, error: np.ndarray, drift: float, settings: Diagnosing) -> list[Group]:
-    """What a base is fitted with. error: what a finer grid changes [m], (K, T, 3); drift: its size [m]."""
-    groups = [*camera(clip, simulated), drifting(clip, drift), simulator(clip, error, settings.model_error)]
-    return chosen(groups, settings)
+def of_base(
+    clip: Clip, simulated: np.ndarray, error: np.ndarray, by_place: np.ndarray, drift: float, noise: Noise,
+    settings: Diagnosing,
+) -> list[Group]:  # fmt: skip
+    """What a base is fitted with.
+
+    error: what a finer grid changes [m], (K, T, 3); by_place: how displacement changes with where points sit [1],
+    (3, K, T, 3); drift: its size [m].
+    """
+    groups = [*camera(clip, simulated), drifting(clip, drift), places(clip, by_place, noise)]
+    return chosen([*groups, simulator(clip, error, settings.model_error)], settings)
 
 
 def of_laws(
-    clip: Clip, base: Base, error: np.ndarray, drift: float, memo: Memo, settings: Diagnosing, workers: int
-) -> list[Group]:
+    clip: Clip, base: Base, error: np.ndarray, drift: float, noise: Noise, memo: Memo, settings: Diagnosing,
+    workers: int,
+) -> list[Group]:  # fmt: skip
     """What laws are fitted with: the same, and grips, held tissue and elastic laws that may be others."""
     near, moved = base.tangent, HELD * by_held(clip, base.x, base.simulated, memo)
     groups = [*other_bodies(clip, base, memo, workers), firmness(clip, near), path(clip, near), closing(clip, near)]
     if moved.any():
         groups.append(Group("held", moved[None], (("where what is held ends", HELD, "m"),)))
-    return of_base(clip, base.simulated, error, drift, settings) + chosen(groups, settings)
+    sits = by_place(base.prepared, clip, base.run)
+    return of_base(clip, base.simulated, error, sits, drift, noise, settings) + chosen(groups, settings)
 
 
 def chosen(groups: list[Group], settings: Diagnosing) -> list[Group]:
@@ -126,6 +139,24 @@ def camera(clip: Clip, simulated: np.ndarray) -> list[Group]:
     scales = np.stack([SCALE * simulated * e for e in np.eye(3)])
     named = tuple((f"scale along {a}", SCALE, "1") for a in "xyz")
     return [Group("lag", LAG * velocity[None], (("tracker lag", LAG, "s"),)), Group("scale", scales, named)]
+
+
+def places(clip: Clip, by_place: np.ndarray, noise: Noise) -> Group:
+    """Where points sit on the body: tissue beside them moves otherwise.
+
+    by_place: how displacement changes with it [1], (3, K, T, 3).
+    """
+    sigma = noise.sigma * noise.level / np.sqrt((noise.level**2).mean())
+    found = []
+    for k, slope in enumerate(np.moveaxis(by_place, 1, 0)):
+        seen = slope[:, clip.seen[k]].reshape(3, -1)
+        worth, ways = np.linalg.eigh(PLACE**2 * seen @ seen.T)
+        found += [(w, k, PLACE * sigma[k] * np.tensordot(way, slope, 1)) for w, way in zip(worth, ways.T, strict=True)]
+    found = sorted((one for one in found if one[0] > SLIGHT), key=lambda one: -one[0])[:MOST_PLACES]
+    columns = np.zeros((len(found), *by_place.shape[1:]))
+    for column, (_, k, moved) in zip(columns, found, strict=True):
+        column[k] = moved
+    return Group("place", columns)
 
 
 def drifting(clip: Clip, size: float, frames: int | None = None) -> Group:

@@ -59,6 +59,9 @@ def write(
         if not said_of.named:
             shown = replace(shown, after=shown.before, placebo=None)
     verdict, chances, named = said_of.verdict, said_of.chances, said_of.named
+    if verdict == "unexplained":
+        left = max(explainable(case.smooth), said_of.chosen.fitted.gain)
+        case = replace(case, base=replace(base, known=base.known.beside(left)))
     members = [*said_of.accepted, *said_of.others]
     effects = [_effect(case, r, chances, {m.term for m in members}) for r in members]
     noise, explained = said_of.noise, said_of.explained
@@ -95,7 +98,7 @@ def write(
         nuisances=nuisances(case),
         goodness=goodness(case, said_of.after),
         untold=list(base.bound),
-        base=base_numbers(base),
+        base=base_numbers(case.base),
         noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(noise).items()}
         | {"sigma": noise.sigma, "unit": "m"},
         global_test={

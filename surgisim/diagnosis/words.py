@@ -61,6 +61,8 @@ WHY = {
     "catalogue, or more than one thing",
     "loose": "a push follows whatever comes and goes, and this one leaves {left:.0f} % of what any smooth motion "
     "could explain: what is missing is another thing",
+    "unfit": "beside it the frames held out stay off by much more than noise: what is missing is not in the catalogue, "
+    "or more than one thing",
     "refuted": "the frames held out are farther off with it than without",
     "beaten": "the same law at a wrong place, or a wrong law, foretells the frames held out better",
     "unconfirmed": "this recording cannot confirm it (probability {chance:.2f}): another pull, held and released "

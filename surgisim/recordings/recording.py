@@ -82,11 +82,20 @@ class Recording:
         return self.split["held_out"] if self.split else (self.fitted_until, self.frames)
 
     def attached(self) -> np.ndarray:
-        """Rest position that each point is taken to follow [m], (K, 3): `place`, or where it is first seen."""
+        """Rest position that each point is taken to follow [m], (K, 3).
+
+        `place`, or the mean over the frames before the first grasp; where it first is of a point that is not seen
+        there, and of all where frame 0 lets an unloaded shape go or nothing is grasped.
+        """
         if self.place is not None:
             return self.place
         first = self.visible.argmax(1)
-        return self.points[np.arange(len(first)), first].astype(float)
+        where = self.points[np.arange(len(first)), first].astype(float)
+        rest = int(self.motion.active.any(0).argmax())
+        seen = self.visible[:, :rest]
+        known = seen.any(1) & (self.starts == "settled")
+        total = np.where(seen[..., None], self.points[:, :rest].astype(float), 0.0).sum(1)
+        return np.where(known[:, None], total / np.maximum(seen.sum(1), 1)[:, None], where)
 
     def body(self, spacing: float, raised: float = 0.0) -> Body:
         """Particles for a grid of `spacing` [m], those in the boxes held, which reach `raised` [m] further all round.

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import diagnose, nuisance
-from surgisim.diagnosis.base import tracks_of
+from surgisim.diagnosis.base import by_place, carried, tracks_of
 from surgisim.diagnosis.diagnose import whitened
 from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
@@ -21,8 +21,8 @@ from surgisim.diagnosis.nuisance import chosen
 from surgisim.diagnosis.self_consistency import drawn
 
 NAMES = (
-    "release", "held", "lag", "scale", "drift", "simulator", "grip radius", "grip centre", "grip firmness", "grip path",
-    "elastic law", "closing",
+    "release", "held", "lag", "scale", "drift", "place", "simulator", "grip radius", "grip centre", "grip firmness",
+    "grip path", "elastic law", "closing",
 )  # fmt: skip
 DIRECTIONS, DRAWS = 300, 12
 
@@ -97,6 +97,19 @@ def test_a_grip_that_the_grid_widens_may_be_smaller_by_as_much(case):
     group = next(g for g in nuisance.other_bodies(clip, base, case.memo, 1) if g.name == "grip radius")
     assert group.values[0][1] == pytest.approx(np.hypot(nuisance.RADIUS, 0.25))
     assert np.abs(group.columns[0]).max() > 1e-4
+
+
+def test_points_that_sit_beside_where_they_are_taken_to_be_are_explained(case):
+    clip, until, prepared, run = case.clip, case.clip.until, case.base.prepared, case.base.run
+    loose = replace(case.noise, level=10 * case.noise.level)
+    by = 10 * case.noise.sigma * np.random.default_rng(14).standard_normal(clip.rest.shape)
+    off = carried(prepared.simulator.carry(clip.rest + by), run) - case.base.simulated
+    white = case.whiten(off[:, :until])[:, None]
+    group = nuisance.places(clip, by_place(prepared, clip, run), loose)
+    assert 0 < len(group.columns) <= nuisance.MOST_PLACES
+    assert (np.abs(group.columns).max((2, 3)) > 0).sum(1).max() == 1
+    space = metric(whitened(case.whiten, [group], until))
+    assert space.gram(white, white) < 0.25 * (white**2).sum()
 
 
 def test_a_camera_that_drifts_is_said(case):

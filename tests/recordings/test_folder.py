@@ -129,6 +129,17 @@ def test_a_point_follows_the_tissue_where_it_is_first_seen(tmp_path):
     np.testing.assert_array_equal(read_recording(tmp_path).attached(), place)
 
 
+def test_a_point_seen_at_rest_follows_the_tissue_where_it_is_on_average(tmp_path):
+    made, grasp = recording(), 3
+    made.motion.active[:, :grasp] = False
+    made.points[:, 0] += np.random.default_rng(2).normal(0, 1e-4, (4, 3))
+    np.testing.assert_allclose(made.attached(), np.nanmean(made.points[:, :grasp], 1), rtol=1e-6)
+    made.points[0, 0], made.visible[0, 0] = np.nan, False
+    np.testing.assert_allclose(made.attached()[0], made.points[0, 1:grasp].mean(0), rtol=1e-6)
+    let_go = replace(made, starts="released")
+    np.testing.assert_array_equal(let_go.attached()[1:], made.points[1:, 0])
+
+
 JSON = [
     ({"format": "another/1"}, "its format is 'another/1'"),
     ({"name": "gone"}, r"lacks \['name'\]"),
