@@ -234,9 +234,11 @@ def _reason(
     case: Case, chosen: Explanation, chance: float, explained: float, took: float, unfit: bool, over: Gain | None
 ) -> str:
     """Why it is named, or not; chance: its probability among all laws."""
-    evidence = chosen.log_evidence if case.settings.calibrated else np.inf
+    evidence, seen = chosen.log_evidence, took >= calibration.TAKEN
+    if not case.settings.calibrated:
+        evidence, seen = np.inf, True
     certain = evidence >= calibration.CLEAR or case.overstretched
-    if not certain and took < calibration.TAKEN:
+    if not certain and not seen:
         return "faint"
     if chosen.loose:
         return "loose"
@@ -246,7 +248,7 @@ def _reason(
     if chosen.refuted:
         return "refuted" if certain else "faint"
     # A smooth field follows what grid and mesh have wrong too: what frames held out confirm need not explain all of it.
-    much = took >= calibration.TAKEN and (explained >= calibration.EXPLAINED or chosen.confirmed)
+    much = seen and (explained >= calibration.EXPLAINED or chosen.confirmed)
     if evidence < calibration.THRESHOLD or not much:
         return "little" if certain else "faint"
     if unfit:

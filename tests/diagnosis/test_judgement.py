@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from surgisim.diagnosis import judgement
-from surgisim.diagnosis.calibration import CLEAR, PULLS, PUSH_LEAVES, THRESHOLD
+from surgisim.diagnosis.calibration import CLEAR, PULLS, PUSH_LEAVES, TAKEN, THRESHOLD
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint
@@ -33,8 +33,8 @@ def explanation(term="gravity", evidence=90.0, ahead=BETTER, left=0.05, out=None
     return Explanation(Joint([one], np.zeros((1, 1, 3)), 100.0, np.zeros(3)), evidence, ahead, left, out)
 
 
-def reason(chosen: Explanation, chance=0.9, explained=0.9, took=0.9, over=None, case=CASE) -> str:
-    return judgement._reason(case, chosen, chance, explained, took, over)
+def reason(chosen: Explanation, chance=0.9, explained=0.9, took=0.9, unfit=False, over=None, case=CASE) -> str:
+    return judgement._reason(case, chosen, chance, explained, took, unfit, over)
 
 
 def test_what_frames_held_out_refute_gives_way_to_the_next_that_they_confirm():
@@ -110,7 +110,8 @@ def test_two_laws_named_together_are_no_class():
 
 
 @pytest.mark.parametrize(
-    ("evidence", "overstretched", "said"), [(49, False, "faint"), (51, False, "little"), (20, True, "little")]
+    ("evidence", "overstretched", "said"),
+    [(CLEAR - 1, False, "faint"), (CLEAR + 1, False, "little"), (THRESHOLD - 1, True, "little")],
 )
 def test_what_explains_little_says_that_something_is_hidden_only_where_that_is_certain(evidence, overstretched, said):
     case = SimpleNamespace(settings=CASE.settings, overstretched=overstretched)
@@ -119,7 +120,13 @@ def test_what_explains_little_says_that_something_is_hidden_only_where_that_is_c
 
 @pytest.mark.parametrize(
     ("evidence", "ahead", "took", "said"),
-    [(90, BETTER, 0.3, "named"), (90, BETTER, 0.1, "little"), (90, ALIKE, 0.3, "little"), (40, BETTER, 0.3, "faint")],
+    [
+        (CLEAR + 1, BETTER, 2 * TAKEN, "named"),
+        (CLEAR - 1, BETTER, 2 * TAKEN, "named"),
+        (CLEAR + 1, BETTER, 0.5 * TAKEN, "little"),
+        (CLEAR + 1, ALIKE, 2 * TAKEN, "little"),
+        (CLEAR - 1, ALIKE, 2 * TAKEN, "faint"),
+    ],
 )
 def test_what_frames_held_out_confirm_need_not_explain_all_that_a_smooth_field_does(evidence, ahead, took, said):
     assert reason(explanation(evidence=evidence, ahead=ahead), explained=0.3, took=took) == said
@@ -153,9 +160,15 @@ def test_of_two_laws_that_do_the_same_the_simpler_comes_first(monkeypatch, more,
 
 def test_a_law_is_not_named_for_little():
     assert reason(explanation(ahead=ALIKE), explained=0.5) == "little"
-    assert reason(explanation(evidence=CLEAR - 1), took=0.1) == "faint"
-    assert reason(explanation(evidence=CLEAR + 1), took=0.1) == "named"
-    assert reason(explanation(evidence=CLEAR - 1), took=0.1, case=UNCALIBRATED) == "named"
+    assert reason(explanation(evidence=CLEAR - 1), took=0.5 * TAKEN) == "faint"
+    assert reason(explanation(evidence=CLEAR + 1), took=0.5 * TAKEN) == "little"
+    assert reason(explanation(evidence=CLEAR - 1), took=0.5 * TAKEN, case=UNCALIBRATED) == "named"
+
+
+def test_what_leaves_frames_held_out_far_off_is_not_named():
+    assert reason(explanation(evidence=CLEAR + 1), unfit=True) == "unfit"
+    assert reason(explanation(evidence=CLEAR - 1), unfit=True) == "faint"
+    assert reason(explanation(evidence=CLEAR + 1, ahead=WORSE), unfit=True) == "refuted"
 
 
 def test_a_tie_with_a_placebo_is_no_defeat():
