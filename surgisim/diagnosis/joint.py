@@ -73,8 +73,8 @@ def needed(case, both: Joint) -> Joint:
 
 
 def least(one: Joint) -> float:
-    """log evidence that a law must add beside `one`: what its signature has wrong must not pass for another law."""
-    return calibration.THRESHOLD + calibration.FITTED_MISFIT * one.gain
+    """Half the chi square that a law must take off beside `one`, whose signature's error must not pass for it."""
+    return calibration.ADDS + calibration.FITTED_MISFIT * one.gain
 
 
 def _alone(case, both: Joint, kept) -> list[Joint]:

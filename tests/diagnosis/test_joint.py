@@ -66,9 +66,9 @@ def test_a_law_that_came_out_as_nothing_is_dropped_and_one_that_says_something_i
     both = fitted(strand, weight)
     # So little of the strands shows in a pull that hardly runs along them: they stay or go with what is asked.
     assert 3.0 < 0.5 * (both.gain - fitted(weight).gain) < 25.0
-    monkeypatch.setattr(calibration, "THRESHOLD", 3.0)
+    monkeypatch.setattr(calibration, "ADDS", 3.0)
     assert needed(case, both) is both
-    monkeypatch.setattr(calibration, "THRESHOLD", 25.0)
+    monkeypatch.setattr(calibration, "ADDS", 25.0)
     assert [r.term for r in needed(case, both).refits] == ["gravity"]
 
 
