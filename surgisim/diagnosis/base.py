@@ -54,7 +54,7 @@ class Known:
     def beside(self, left: float) -> "Known":
         """The same where a law that nobody knows leaves so much chi square: its share of that is the numbers' too."""
         surer, prior = np.linalg.inv(self.near), np.diag(SPREAD**-2)
-        less = calibration.TEMPERATURE / (calibration.TEMPERATURE + calibration.MISFIT * left)
+        less = calibration.ALIKE_ERRORS / (calibration.ALIKE_ERRORS + calibration.MISFIT * left)
         return replace(self, near=np.linalg.inv(less * (surer - prior) + prior))
 
     def draws(self, x: np.ndarray) -> np.ndarray:

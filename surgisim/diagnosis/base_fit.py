@@ -152,8 +152,7 @@ def settled(clip: Clip, whiten: Whitener, space: Metric, slopes: slice, base: Ba
         near = tangent(base.prepared, values_of(found.x), found.drive, found.run, clip.rest, until)
         found = replace(found, tangent=near)
     open_to = np.linalg.inv(np.eye(space.columns.shape[1]) + (space.columns.T @ space.columns).astype(float))
-    # As uncertain as a verdict takes evidence to be: what grid and mesh still have wrong is alike in many samples.
-    told = (np.linalg.inv(open_to[slopes, slopes]) - np.eye(3)) / calibration.TEMPERATURE
+    told = (np.linalg.inv(open_to[slopes, slopes]) - np.eye(3)) / calibration.ALIKE_ERRORS
     near = np.linalg.inv(np.eye(3) + told) * np.outer(SPREAD, SPREAD)
     return replace(found, known=replace(base.known, near=near), bound=at_bound(found.x, clip))
 

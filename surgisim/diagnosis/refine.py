@@ -141,8 +141,7 @@ def refined(
         response = respond(clip, replace(base, x=there), law, case.memo) - base.simulated
     except IMPOSSIBLE:
         return None
-    # As uncertain as the verdict takes evidence to be: signatures are not exact.
-    heat = calibration.TEMPERATURE + calibration.MISFIT * max(nothing - best, 0.0)
+    heat = calibration.ALIKE_ERRORS + calibration.MISFIT * max(nothing - best, 0.0)
     spread = np.linalg.inv((normal - np.eye(len(x))) / heat + np.eye(len(x)))
     rng = np.random.default_rng([case.settings.seed, 3])
     near = rng.multivariate_normal(x, spread, DRAWS)

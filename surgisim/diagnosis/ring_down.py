@@ -229,11 +229,10 @@ def softest(ends: list[Descent]) -> Descent:
     return min((d for d in ends if d.cost < ends[0].cost + ALIKE), key=lambda d: d.y[0])
 
 
-def aside(ends: list[Descent], heat: float = calibration.TEMPERATURE) -> np.ndarray:
+def aside(ends: list[Descent], heat: float = calibration.ALIKE_ERRORS) -> np.ndarray:
     """How far x is from the chosen body where descents ended, each drawn as often as its chi square says, (DRAWS, 3).
 
-    heat: by which chi square is divided; no surer than a verdict takes evidence to be: what grid and mesh still have
-    wrong is alike in many samples.
+    heat: by which chi square is divided.
     """
     chosen = softest(ends)
     weight = np.exp(-0.5 * np.maximum([d.cost - chosen.cost for d in ends], 0) / heat)

@@ -10,7 +10,7 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import base_fit as fitting
 from surgisim.diagnosis import ring_down
 from surgisim.diagnosis.base import START, TERMS, Known
-from surgisim.diagnosis.calibration import TEMPERATURE
+from surgisim.diagnosis.calibration import ALIKE_ERRORS
 from surgisim.diagnosis.clip import OPENS, clip_of
 from surgisim.diagnosis.diagnose import prepare_case
 from surgisim.diagnosis.joint import based
@@ -58,7 +58,7 @@ def test_bodies_that_fit_about_as_well_are_part_of_how_surely_one_is_known():
         return ring_down.aside([best, ring_down.Descent(stiff, None, 100.0 + dearer)])
 
     # As often as it is as probable, as far away as it is, and on its own side.
-    for dearer, often in ((0.0, 0.5), (2 * TEMPERATURE * np.log(3.0), 0.25), (1e3, 0.0)):
+    for dearer, often in ((0.0, 0.5), (2 * ALIKE_ERRORS * np.log(3.0), 0.25), (1e3, 0.0)):
         assert (away(dearer)[:, 0] == 2.0).mean() == pytest.approx(often, abs=0.07)
         assert (away(dearer)[:, 0] >= 0).all()
     known = Known(np.zeros((3, 3)), away(0.0))
