@@ -78,7 +78,10 @@ def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_fi
     assert [text for _, text in said[2:4]] == ["noise, on a finer grid", "trying, on a finer grid"]
 
 
-@pytest.mark.parametrize(("evidence", "strained", "wanted"), [(49, True, True), (51, True, False), (49, False, False)])
+@pytest.mark.parametrize(
+    ("evidence", "strained", "wanted"),
+    [(calibration.CLEAR - 1, True, True), (calibration.CLEAR + 1, True, False), (calibration.CLEAR - 1, False, False)],
+)
 def test_a_law_that_is_clear_needs_no_finer_grid(evidence, strained, wanted):
     laws = {"gravity": evidence, "tether": 3.0}
     assert (
