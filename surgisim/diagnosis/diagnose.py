@@ -232,10 +232,10 @@ def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts 
 
 
 def threshold(laws: Scores, settings: Diagnosing) -> float:
-    """log evidence that the best law must exceed."""
+    """log evidence of the fitted frames that the best law must exceed to be run."""
     if not settings.calibrated:
         return 0.0
-    return max(calibration.THRESHOLD, float(np.quantile(highest(laws), 0.95)))
+    return max(calibration.TRIED, float(np.quantile(highest(laws), 0.95)))
 
 
 def from_rest(case: Case, best: Refit, z: np.ndarray) -> bool:

@@ -67,7 +67,7 @@ class Explanation:
     @property
     def sound(self) -> bool:
         """Whether nothing speaks against it but what has not been seen."""
-        return not (self.refuted or self.loose or self.drawn) and self.log_evidence > calibration.THRESHOLD
+        return not (self.refuted or self.loose or self.drawn) and self.support > calibration.THRESHOLD
 
     @property
     def refuted(self) -> bool:
@@ -234,9 +234,10 @@ def _reason(
     case: Case, chosen: Explanation, chance: float, explained: float, took: float, unfit: bool, over: Gain | None
 ) -> str:
     """Why it is named, or not; chance: its probability among all laws."""
-    evidence, seen = chosen.log_evidence, took >= calibration.TAKEN
+    evidence, enough = chosen.log_evidence, chosen.support >= calibration.THRESHOLD
+    seen = took >= calibration.TAKEN
     if not case.settings.calibrated:
-        evidence, seen = np.inf, True
+        evidence, enough, seen = np.inf, True, True
     certain = evidence >= calibration.CLEAR or case.overstretched
     if not certain and not seen:
         return "faint"
@@ -249,7 +250,7 @@ def _reason(
         return "refuted" if certain else "faint"
     # A smooth field follows what grid and mesh have wrong too: what frames held out confirm need not explain all of it.
     much = seen and (explained >= calibration.EXPLAINED or chosen.confirmed)
-    if evidence < calibration.THRESHOLD or not much:
+    if not (enough and much):
         return "little" if certain else "faint"
     if unfit:
         return "unfit" if certain else "faint"

@@ -42,7 +42,7 @@ def test_what_frames_held_out_refute_gives_way_to_the_next_that_they_confirm():
     assert stands([refuted, blind, confirmed]) is confirmed
     assert stands([refuted, blind]) is refuted
     assert stands([blind, confirmed]) is blind
-    weak = explanation(evidence=THRESHOLD - 1)
+    weak = explanation(evidence=THRESHOLD - 1 - 0.5 * BETTER.value)
     assert stands([refuted, weak]) is refuted
 
 
@@ -67,7 +67,9 @@ def test_what_they_gain_or_lose_counts_among_the_evidence():
         (explanation(ahead=ALIKE), "unconfirmed"),
         (explanation(ahead=BLIND), "named"),
         (explanation(ahead=None), "named"),
-        (explanation(evidence=THRESHOLD - 1), "faint"),
+        (explanation(evidence=THRESHOLD - 1), "named"),
+        (explanation(evidence=THRESHOLD - 1 - 0.5 * BETTER.value), "faint"),
+        (explanation(evidence=THRESHOLD - 1, ahead=None), "faint"),
         (explanation(ahead=WORSE, evidence=CLEAR - 1), "faint"),
         (explanation(ahead=WORSE, evidence=CLEAR + 1), "refuted"),
         (explanation("hidden_contact", left=PUSH_LEAVES + 0.1, out=-0.8), "loose"),
