@@ -26,8 +26,11 @@ LOW, HIGH = np.array([np.log(2e2), 0.30, np.log(5e-5)]), np.array([np.log(1e6), 
 NAMES = ("E", "nu", "eta / E")
 HELD = 1e-3
 """Standard deviation of where what is held ends [m]: nobody glues to the millimetre."""
-ASIDE = 0.05
-"""Of a cell: how far aside points are looked at for how displacement changes there."""
+STEP = 0.05
+"""Of a cell: step of the differences that a displacement gradient is made of."""
+FINE_ENOUGH = 0.4
+"""Of how much softer than tissue a coarse grid is, over how much softer than the finer grid: standard deviation about 1
+[1]."""
 SLOWER = 8
 """Times that viscosity may shorten the stable step of tissue of the usual stiffness (`mpm/stable.py`). To a base
 without memory, tissue that relaxes looks viscous without bound, and its runs would take minutes each."""
@@ -54,7 +57,7 @@ class Known:
     def beside(self, left: float) -> "Known":
         """The same where a law that nobody knows leaves so much chi square: its share of that is the numbers' too."""
         surer, prior = np.linalg.inv(self.near), np.diag(SPREAD**-2)
-        less = calibration.ALIKE_ERRORS / (calibration.ALIKE_ERRORS + calibration.MISFIT * left)
+        less = calibration.ALIKE_ERRORS / calibration.temperature(calibration.ALIKE_ERRORS, left)
         return replace(self, near=np.linalg.inv(less * (surer - prior) + prior))
 
     def draws(self, x: np.ndarray) -> np.ndarray:
@@ -84,14 +87,20 @@ class Base:
         """Posterior standard deviation of x, (3,)."""
         return self.known.spread
 
-    @property
-    def values(self) -> Values:
-        return values_of(self.x)
-
 
 def values_of(x: np.ndarray) -> Values:
     E, nu = float(np.exp(x[0])), float(x[1])
     return {TERMS[0]: {"E": E, "nu": nu}, TERMS[1]: {"eta": E * float(np.exp(x[2]))}}
+
+
+def values_on(clip: Clip, x: np.ndarray) -> Values:
+    """Of numbers x, (3,), as runs on the clip's grid take them."""
+    return values_of(clip.on_grid(x))
+
+
+def softness(clip: Clip) -> np.ndarray:
+    """Covariance of a base's numbers, (3, 3), because a finer grid is not yet tissue."""
+    return np.diag((FINE_ENOUGH * clip.stiffer) ** 2)
 
 
 def bounded(x: np.ndarray, clip: Clip) -> np.ndarray:
@@ -120,9 +129,9 @@ def carried(carry, run: Run) -> np.ndarray:
     return np.stack([carry @ u.astype(float) for u in run.u], 1)
 
 
-def by_place(prepared: Prepared, clip: Clip, run: Run) -> np.ndarray:
-    """Derivative of the points' displacement by where each sits on the body, along each axis [1], (3, K, T, 3)."""
-    step, result = ASIDE * clip.body.spacing, []
+def displacement_gradient(prepared: Prepared, clip: Clip, run: Run) -> np.ndarray:
+    """Derivative of displacement by rest position at the points, along each axis [1], (3, K, T, 3)."""
+    step, result = STEP * clip.body.spacing, []
     for way in step * np.eye(3):
         ahead, behind = (carried(prepared.simulator.carry(clip.rest + by), run) for by in (way, -way))
         result.append((ahead - behind) / (2 * step))
@@ -131,24 +140,23 @@ def by_place(prepared: Prepared, clip: Clip, run: Run) -> np.ndarray:
 
 def simulate(prepared: Prepared, clip: Clip, x: np.ndarray, memo: Memo, frames: int) -> tuple[Drive, Run]:
     """The base up to frame `frames`, exclusive; x: (3,), or with moments of release, (3 + R,)."""
-    values, clip = values_of(x), clip.opens(x[3:])
-    made = memo(
-        ["base", x[:3].tolist(), frames, *clip.kind], lambda: vars(run_base(prepared, clip, values, last=frames - 1))
-    )
+    values, clip = values_on(clip, x), clip.opens(x[3:])
+    what = ["base", clip.on_grid(x).tolist(), frames, *clip.kind]
+    made = memo(what, lambda: vars(run_base(prepared, clip, values, last=frames - 1)))
     return base_drive(prepared, clip, values), Run(**made)
 
 
 def tracks_of(clip: Clip, x: np.ndarray, memo: Memo, terms: tuple[str, str] = TERMS) -> np.ndarray:
     """Displacement of the points over the whole clip [m], (K, T, 3), with E, nu and eta of x."""
     prepared = clip.prepared(terms)
-    values = dict(zip(terms, values_of(x).values(), strict=True))
+    values = dict(zip(terms, values_on(clip, x).values(), strict=True))
 
     def make() -> dict[str, np.ndarray]:
         run = run_base(prepared, clip, values, last=clip.frames - 1)
         return {"seen": carried(prepared.simulator.carry(clip.rest), run)}
 
     motion = [clip.motion.radius.tolist(), clip.motion.center_rest.tolist(), np.round(clip.motion.position, 9).tolist()]
-    return memo(["tracks", terms, x.tolist(), *motion, *clip.kind], make)["seen"]
+    return memo(["tracks", terms, clip.on_grid(x).tolist(), *motion, *clip.kind], make)["seen"]
 
 
 def by_held(clip: Clip, x: np.ndarray, simulated: np.ndarray, memo: Memo) -> np.ndarray:

@@ -7,7 +7,7 @@ released, through whole runs.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,10 +20,12 @@ from surgisim.diagnosis.base import (
     Known,
     at_bound,
     bounded,
-    by_place,
     carried,
+    displacement_gradient,
     simulate,
+    softness,
     values_of,
+    values_on,
 )
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
@@ -31,8 +33,10 @@ from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Whitener
 from surgisim.diagnosis.ring_down import ASIDE, DRAWS, Descent, RingDown, aside, softest, told
 from surgisim.diagnosis.tangent import Tangent, base_piola, tangent
+from surgisim.estimation.trial import at_once
+from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import Prepared
-from surgisim.mpm.simulator import Breakdown
+from surgisim.mpm.simulator import Breakdown, Run
 
 ROUNDS, AGAIN = 3, 25.0
 """Fits at most, and what chi square a run may cost beyond what the last one promised; chosen: 3 where it went well."""
@@ -41,60 +45,207 @@ NEWTONS, SETTLED = 2, 0.1
 none, in prior standard deviations."""
 STIFFER = np.log(3.0)
 """Step of log E where the body to begin with is torn apart."""
+VALLEYS, FOLLOWED = 0.5, 4
+"""Prior standard deviations beyond which descents ended in two valleys, and how many of these, best first, are gone
+down on the finer grid: of two moments of a release it may put the other first."""
+SOFTER, INDEPENDENT, MATCHES, NEAR = 0.3, 8, 4, 0.1
+"""Prior standard deviation of how much softer a coarse grid's tissue is than a finer one's, in logarithms of E and of
+eta / E; as how many independent samples all else counts by which grids differ; fits at most; step of differences."""
 
-Nuisances = Callable[[Clip, np.ndarray, np.ndarray, np.ndarray, bool], np.ndarray]
-"""Of a clip, a base's numbers (3,), its tracks [m], (K, T, 3), their derivative by where points sit [1], (3, K, T, 3),
-and whether these are a first guess: whatever else a residual may hold, whitened at one standard deviation, (N, M)."""
+
+Nuisances = Callable[[Clip, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""Of a clip, a base's tracks [m], (K, T, 3), their displacement gradient [1], (3, K, T, 3), and what a finer grid
+changes in them [m], (K, T, 3): whatever else a residual may hold, whitened at one standard deviation, (N, M)."""
+
+
+@dataclass(frozen=True)
+class Laid:
+    """The base on one grid, ready to run."""
+
+    clip: Clip
+    bodies: list[Prepared]
+    """One for each run at a time."""
+    carry: object
+
+    @classmethod
+    def on(cls, clip: Clip, workers: int) -> "Laid":
+        bodies = [clip.prepared(TERMS) for _ in range(workers)]
+        return cls(clip, bodies, bodies[0].simulator.carry(clip.rest))
+
+    def opens(self, late: np.ndarray) -> "Laid":
+        return replace(self, clip=self.clip.opens(late))
+
+    def stiffened(self, by: np.ndarray) -> "Laid":
+        """Where numbers are taken so much stiffer, (3,)."""
+        return replace(self, clip=replace(self.clip, stiffer=by))
+
+    def run(self, x: np.ndarray, memo: Memo) -> tuple[Drive, Run, np.ndarray]:
+        """With numbers x, (3,): drive, run and displacement of the points [m], (K, T, 3)."""
+        drive, run = simulate(self.bodies[0], self.clip, x, memo, self.clip.frames)
+        return drive, run, carried(self.carry, run)
+
+
+@dataclass(frozen=True)
+class Ran:
+    """The base with some numbers on the clip's grid, and how a finer one shows it."""
+
+    laid: Laid
+    """Its clip with what numbers must be `stiffer` by there."""
+    x: np.ndarray
+    """(3,)"""
+    drive: Drive
+    run: Run
+    simulated: np.ndarray
+    """Displacement of the points [m], (K, T, 3)."""
+    finer: Laid
+    """The same as `laid` where no finer grid is asked for, or where the engine breaks down there."""
+    finer_run: Run
+    finer_simulated: np.ndarray
+
+    @classmethod
+    def at(cls, x: np.ndarray, laid: Laid, finer: Laid | None, whiten: Whitener, memo: Memo) -> "Ran":
+        """With numbers x, or those of the first stiffer body that stands."""
+        x, ran = _standing(laid, x, memo)
+        there = None if finer is None else _ran(finer, x, memo)
+        if there is None:
+            return cls(laid, x, *ran, laid, *ran[1:])
+        softened = laid.stiffened(_softened(laid, x, ran[1], ran[2], there[2], whiten, memo))
+        again = _ran(softened, x, memo)
+        if again is not None:
+            laid, ran = softened, again
+        return cls(laid, x, *ran, finer, *there[1:])
+
+    @property
+    def clip(self) -> Clip:
+        return self.laid.clip
+
+    @property
+    def error(self) -> np.ndarray:
+        """What the finer grid changes [m], (K, T, 3)."""
+        return self.finer_simulated - self.simulated
+
+    def tangent(self) -> Tangent:
+        values = values_on(self.clip, self.x)
+        return tangent(self.laid.bodies[0], values, self.drive, self.run, self.clip.rest, self.clip.until)
+
+    def by_poisson(self, near: Tangent) -> np.ndarray:
+        """Derivative of the points' displacement by nu [m], (K, T_fit, 3)."""
+        return _by_poisson(self.laid.bodies[0], near, self.clip.on_grid(self.x))
+
+    def metric(self, nuisances: Nuisances, error: np.ndarray) -> Metric:
+        gradient = displacement_gradient(self.laid.bodies[0], self.clip, self.run)
+        return metric(nuisances(self.clip, self.simulated, gradient, error))
 
 
 def fit_base(
     clip: Clip, whiten: Whitener, nuisances: Nuisances, memo: Memo, *,
-    rounds: int = ROUNDS, workers: int = 1, timing: bool = True, begun: Base | None = None,
+    finer: float | None = None, rounds: int = ROUNDS, workers: int = 1, timing: bool = True, begun: Base | None = None,
     say: Callable[[str], None] = lambda text: None,
-) -> tuple[Clip, Base]:  # fmt: skip
-    """E, nu and eta, and when grips open; the clip with the latter, and the base.
+) -> tuple[Clip, Base, Laid]:  # fmt: skip
+    """E, nu and eta, and when grips open; the clip with the latter, the base, and the grid that it was fitted on.
 
-    Begun anew, at most `rounds` times,
-    where a run fits worse than the tangent and the short runs before it promised. timing: whether the moments of
-    releases are free; begun: a base of nearly the same body.
+    A coarse grid's tissue rings slower, and stiffer numbers would make up for it. So numbers are those of a grid of
+    spacing `finer`, over the cube root of the body's volume: where the best of descents from all over the range got to
+    on the clip's grid, they go on on the finer one. Runs on the clip's take numbers as much `stiffer` as makes it move
+    like that, and what is then still left between the grids is the clip's `error`. Begun anew, at most `rounds` times,
+    where a run fits worse than the short runs before it promised. timing: whether the moments of releases are free;
+    begun: a base of nearly the same body.
     """
     late = [float(clip.opening[j, t]) for j, t in clip.releases()] if timing else []
-    y, promised = np.concatenate([START if begun is None else begun.x, late]), np.inf
+    y, promised, ends = np.concatenate([START if begun is None else begun.x, late]), np.inf, []
     others = np.zeros((DRAWS, 3)) if begun is None else begun.known.aside
-    bodies = [clip.prepared(TERMS) for _ in range(workers)]
-    prepared = bodies[0]
-    carry = prepared.simulator.carry(clip.rest)
+    laid = Laid.on(clip, workers)
+    fine = None if finer is None else Laid.on(clip.laid(share=finer), workers)
+    if begun is None:
+        say(f"base: {told(y)}")
+        ran = Ran.at(y[:3], laid, fine, whiten, memo)
+        ends = _all_over(ran, y[3:], whiten, nuisances, memo, say)
+        laid, y = ran.laid, softest(ends).y
     for n in range(rounds + 1):
-        clip = clip.opens(y[3:])
         say(f"base, run {n + 1}: {told(y)}")
-        if n == 0:
-            y[:3], (drive, run) = _standing(prepared, clip, y[:3], memo, clip.frames)
-        else:
-            drive, run = simulate(prepared, clip, y[:3], memo, clip.frames)
-        simulated = carried(carry, run)
-        near = tangent(prepared, values_of(y[:3]), drive, run, clip.rest, clip.until)
+        ran = Ran.at(y[:3], laid.opens(y[3:]), None if fine is None else fine.opens(y[3:]), whiten, memo)
+        laid, y, near = ran.laid, np.concatenate([ran.x, y[3:]]), ran.tangent()
         if n < 2:
-            sits = by_place(prepared, clip, run)
-            space = metric(nuisances(clip, y[:3], simulated, sits, n == 0 and begun is None))
+            space = ran.metric(nuisances, ran.error)
         around = RingDown(
-            clip, whiten, space, memo, bodies, carry, y.copy(), run, simulated[:, : clip.until],
-            _by_poisson(prepared, near, y[:3]),
+            ran.finer.clip, whiten, space, memo, ran.finer.bodies, ran.finer.carry, y, ran.finer_run,
+            ran.finer_simulated[:, : clip.until], ran.by_poisson(near),
         )  # fmt: skip
         if n > 0:
             cost = around.cost(y, around.left(y))
             if n == rounds or cost < promised + AGAIN + ASIDE * max(cost - whiten.free, 0.0):
                 break
-        if n == 0 and begun is None:
-            ends = around.descents(say)
-            y, others = softest(ends).y, aside(ends)
+        if ends:
+            valleys = around.distinct(ends, VALLEYS)[:FOLLOWED]
+            found = around.descents(say, [around.begun(end.y) for end in valleys])
+            y, others, ends = softest(found).y, aside(found), []
         else:
             y = _on(around, y, say)
         promised = around.cost(y, around.left(y))
     slopes = around.slopes(y)
     known = Known(np.linalg.inv(around.normal(slopes))[:3, :3], others)
-    x = y[:3]
     units = slopes[:3] * SPREAD[:, None, None, None]
-    return clip, Base(x, prepared, drive, run, simulated, near, units, known, at_bound(x, clip))
+    clip = ran.clip.less(None if ran.finer is laid else ran.error)
+    bound = at_bound(ran.x, clip)
+    return clip, Base(ran.x, laid.bodies[0], ran.drive, ran.run, ran.simulated, near, units, known, bound), ran.finer
+
+
+def _all_over(
+    ran: Ran, late: np.ndarray, whiten: Whitener, nuisances: Nuisances, memo: Memo, say: Callable[[str], None]
+) -> list[Descent]:
+    """Where descents from all over the range, and from moments of release `late`, (R,), get to on the clip's grid, best
+    first."""
+    # How a body of other numbers rings says nothing of how this one does.
+    error = ran.error * ran.clip.held[None, :, None]
+    clip = ran.clip.less(error)
+    around = RingDown(
+        clip, whiten, ran.metric(nuisances, error), memo, ran.laid.bodies, ran.laid.carry,
+        np.concatenate([ran.x, late]), ran.run, ran.simulated[:, : clip.until], ran.by_poisson(ran.tangent()),
+    )  # fmt: skip
+    return around.descents(say)
+
+
+def _softened(
+    laid: Laid, x: np.ndarray, run: Run, simulated: np.ndarray, there: np.ndarray, whiten: Whitener, memo: Memo
+) -> np.ndarray:
+    """What numbers on this grid must be stiffer by, (3,), to move as a finer grid does.
+
+    run, simulated: on this grid; there: on the finer one [m], (K, T, 3). Read off what tissue does once let go, or off
+    all frames where nothing is; what else the grids differ by counts as its noise. As it was where the engine breaks
+    down.
+    """
+    clip, ways, until = laid.clip, np.eye(3)[[0, 2]], laid.clip.until
+    nothing = metric(np.zeros((3 * whiten.mask.size, 0)))
+    simulated, by_poisson = simulated[:, :until], np.zeros_like(there[:, :until])
+    around = RingDown(clip, whiten, nothing, memo, laid.bodies, laid.carry, x, run, simulated, by_poisson)
+    free = ~clip.held[:until] if clip.releases() else np.ones(until, bool)
+
+    def left(raised: np.ndarray, body: int = 0) -> np.ndarray:
+        return whiten((there[:, :until] - around.tracks(x - clip.stiffer + raised, body)) * free[:, None])
+
+    raised, tried = clip.stiffer, []
+    try:
+        for _ in range(MATCHES):
+            here, *moved = at_once(left, [raised, *(raised + NEAR * way for way in ways)], len(laid.bodies))
+            tried.append((float(here @ here), raised))
+            J = np.stack([here - m for m in moved], 1) / NEAR
+            weight = INDEPENDENT / max(tried[-1][0], 1e-30)
+            normal = weight * J.T @ J + np.eye(2) / SOFTER**2
+            step = np.linalg.solve(normal, weight * J.T @ here - raised[[0, 2]] / SOFTER**2) @ ways
+            if np.abs(step).max() < SETTLED * SOFTER:
+                break
+            raised = raised + step
+    except Breakdown:
+        return clip.stiffer
+    return min(tried, key=lambda t: t[0])[1]
+
+
+def _ran(laid: Laid, x: np.ndarray, memo: Memo) -> tuple[Drive, Run, np.ndarray] | None:
+    """None where the engine breaks down."""
+    try:
+        return laid.run(x, memo)
+    except Breakdown:
+        return None
 
 
 def _on(around: RingDown, y: np.ndarray, say: Callable[[str], None]) -> np.ndarray:
@@ -107,8 +258,7 @@ def _on(around: RingDown, y: np.ndarray, say: Callable[[str], None]) -> np.ndarr
 def without(case, response: np.ndarray, say: Callable[[str], None]) -> list[Descent]:
     """Bases of a `diagnose.Case` once a law's response over the whole clip [m], (K, T, 3), is taken off, best first.
 
-    Where something is hidden,
-    a base makes up for it with numbers that no step from there leads back from.
+    Where something is hidden, a base makes up for it with numbers that no step from there leads back from.
     """
     clip, base, until = case.clip, case.base, case.clip.until
     late = [float(clip.opening[j, t]) for j, t in clip.releases()] if "release" not in case.settings.without else []
@@ -121,49 +271,51 @@ def without(case, response: np.ndarray, say: Callable[[str], None]) -> list[Desc
     return around.descents(say)
 
 
-def settled(clip: Clip, whiten: Whitener, space: Metric, slopes: slice, base: Base, memo: Memo) -> Base:
-    """The base where everything that is open beside it puts it, and how surely, once all of that is known.
+def settled(
+    clip: Clip, fine: Laid, whiten: Whitener, space: Metric, slopes: slice, base: Base, memo: Memo
+) -> tuple[Clip, Base]:
+    """The base where everything that is open beside it puts it, and how surely, once all of that is known; the clip.
 
-    space: with the base's own slopes in columns `slopes`, each at a prior standard deviation.
+    fine: the grid that it is fitted on; space: with the base's own slopes in columns `slopes`, each at a prior standard
+    deviation.
     """
-    until, found = clip.until, base
+    until, x = clip.until, base.x
+    observed = clip.less(None).moved[:, :until]
 
-    def misfit(at: Base) -> tuple[float, np.ndarray]:
-        z = whiten(clip.moved[:, :until] - at.simulated[:, :until])
+    def misfit(there: np.ndarray) -> tuple[float, np.ndarray]:
+        z = whiten(observed - there[:, :until])
         return float(space.gram(z[:, None], z[:, None])[0, 0]), space.likely(z)[slopes]
 
-    least, likely = misfit(base)
+    plain = base.simulated if clip.error is None else base.simulated + clip.error
+    least, likely = misfit(plain)
     for _ in range(NEWTONS):
-        x = bounded(found.x + np.clip(likely, -1, 1) * SPREAD, clip)
-        if np.abs((x - found.x) / SPREAD).max() < SETTLED:
+        tried = bounded(x + np.clip(likely, -1, 1) * SPREAD, clip)
+        found = None if np.abs((tried - x) / SPREAD).max() < SETTLED else _ran(fine, tried, memo)
+        if found is None:
             break
-        try:
-            drive, run = simulate(base.prepared, clip, x, memo, clip.frames)
-        except Breakdown:
-            break
-        moved = replace(
-            found, x=x, drive=drive, run=run, simulated=carried(base.prepared.simulator.carry(clip.rest), run)
-        )
-        cost, likely = misfit(moved)
+        cost, likely = misfit(found[2])
         if cost > least - 1.0:
             break
-        found, least = moved, cost
-    if found is not base:
-        near = tangent(base.prepared, values_of(found.x), found.drive, found.run, clip.rest, until)
-        found = replace(found, tangent=near)
+        x, plain, least = tried, found[2], cost
+    if x is not base.x:
+        own = Laid(clip, [base.prepared], base.prepared.simulator.carry(clip.rest))
+        drive, run, simulated = own.run(x, memo)
+        near = tangent(base.prepared, values_on(clip, x), drive, run, clip.rest, until)
+        base = replace(base, x=x, drive=drive, run=run, simulated=simulated, tangent=near)
+        clip = clip.less(None if clip.error is None else plain - simulated)
     open_to = np.linalg.inv(np.eye(space.columns.shape[1]) + (space.columns.T @ space.columns).astype(float))
     told = (np.linalg.inv(open_to[slopes, slopes]) - np.eye(3)) / calibration.ALIKE_ERRORS
-    near = np.linalg.inv(np.eye(3) + told) * np.outer(SPREAD, SPREAD)
-    return replace(found, known=replace(base.known, near=near), bound=at_bound(found.x, clip))
+    near = np.linalg.inv(np.eye(3) + told) * np.outer(SPREAD, SPREAD) + softness(clip)
+    return clip, replace(base, known=replace(base.known, near=near), bound=at_bound(x, clip))
 
 
-def _standing(prepared: Prepared, clip: Clip, x: np.ndarray, memo: Memo, frames: int):
-    """The first of ever stiffer bodies that is not torn apart: its numbers, drive and run."""
+def _standing(body: Laid, x: np.ndarray, memo: Memo):
+    """The first of ever stiffer bodies that is not torn apart: its numbers; drive, run and tracks."""
     while True:
         try:
-            return x, simulate(prepared, clip, x, memo, frames)
+            return x, body.run(x, memo)
         except Breakdown:
-            stiffer = bounded(x + np.array([STIFFER, 0.0, 0.0]), clip)
+            stiffer = bounded(x + np.array([STIFFER, 0.0, 0.0]), body.clip)
             if stiffer[0] == x[0]:
                 raise
             x = stiffer

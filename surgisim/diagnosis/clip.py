@@ -1,6 +1,6 @@
 """A recording as the diagnosis sees it: points that the body carries, how they moved, which frames may be fitted."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class Clip:
     seen: np.ndarray
     """(K, T) bool."""
     moved: np.ndarray
-    """Observed displacement [m], (K, T, 3), zero where not seen."""
+    """Observed displacement less `error` [m], (K, T, 3), zero where not seen."""
     until: int
     """First frame that is not fitted."""
     normal: np.ndarray
@@ -56,6 +56,11 @@ class Clip:
     """How far what is held reaches beyond its boxes [m]."""
     late: np.ndarray | None = None
     """How many frames after its last active one each grip opens (`mpm/grip.py`), (J, T); None for a half."""
+    stiffer: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    """What is added to the base's numbers, (3,), when they run on this grid, to move as they do on a finer one."""
+    error: np.ndarray | None = None
+    """What is then still left to what the finer grid shows, with which observed tracks are compared [m], (K, T, 3);
+    None where that is not known."""
 
     @property
     def frames(self) -> int:
@@ -72,6 +77,11 @@ class Clip:
     @property
     def density(self) -> float:
         return self.recording.density or DENSITY
+
+    @property
+    def held(self) -> np.ndarray:
+        """Frames in which a grip holds, (T,) bool."""
+        return self.motion.active.any(0) if len(self.motion.active) else np.zeros(self.frames, bool)
 
     @property
     def time(self) -> np.ndarray:
@@ -107,6 +117,10 @@ class Clip:
         found = [(j, last) for j, on in enumerate(self.motion.active) for _, last in runs(on)]
         return [(j, last) for j, last in found if last < before]
 
+    def on_grid(self, x: np.ndarray) -> np.ndarray:
+        """A base's numbers as this grid's runs take them, (3,)."""
+        return x[:3] + self.stiffer
+
     def opens(self, late: np.ndarray) -> "Clip":
         """The same with fitted releases so many frames after their grips' last active ones, (R,); as it is with none.
 
@@ -119,6 +133,11 @@ class Clip:
             opening[j, t] = after
         return replace(self, late=opening)
 
+    def less(self, error: np.ndarray | None) -> "Clip":
+        """The same with another `error`."""
+        moved = self.moved if self.error is None else self.moved + self.error * self.seen[..., None]
+        return replace(self, moved=moved if error is None else moved - error * self.seen[..., None], error=error)
+
     def laid(self, *, share: float | None = None, raised: float | None = None) -> "Clip":
         """The same on a grid of another spacing, over the cube root of the body's volume, or held further up [m].
 
@@ -126,7 +145,9 @@ class Clip:
         """
         raised = self.raised if raised is None else raised
         spacing = self.body.spacing if share is None else spacing_of(self.recording.mesh, share)
-        return replace(self, body=self.recording.body(float(spacing), raised), raised=raised)
+        stiffer = self.stiffer if share is None else np.zeros(3)
+        body = self.recording.body(float(spacing), raised)
+        return replace(self.less(None), body=body, raised=raised, stiffer=stiffer)
 
     def quiet(self) -> np.ndarray:
         """Frames in which tissue is still or moves slowly: what the noise is read from, (T,) bool."""
@@ -144,7 +165,7 @@ class Clip:
 
     def phases(self) -> np.ndarray:
         """Index into PHASES of every frame, (T,)."""
-        active = self.motion.active.any(0) if len(self.motion.active) else np.zeros(self.frames, bool)
+        active = self.held
         speed = speed_of(self.motion, self.fps, self.frames)
         quick = speed > 0.05 * max(speed.max(), 1e-9)
         begun = np.maximum.accumulate(active)

@@ -85,6 +85,8 @@ def compete(case: Case, laws: Scores, ranked: list[str], progress: Progress) -> 
         case = replace(case, clip=replace(case.clip, shifted=False))
         refits = [refit(case, r.finding, r.searched, case.z) for r in refits]
         refits.sort(key=lambda r: -r.log_evidence)
+    progress(0.74, 1, f"other laws where {refits[0].term} acts")
+    refits = gathered(case, laws, refits)
     close = [r for r in refits if r.gain > calibration.CLOSE * refits[0].gain]
     close = close[: min(settings.free, int(settings.budget / fit_of_a_law(case)))]
     for n, one in enumerate(close):
@@ -92,6 +94,28 @@ def compete(case: Case, laws: Scores, ranked: list[str], progress: Progress) -> 
         better = freed(case, one, case.z, lambda text, done=done: progress(done, 1, text))
         refits = [better if r is one else r for r in refits]
     return case, sorted(refits, key=lambda r: -r.log_evidence)
+
+
+def gathered(case: Case, laws: Scores, refits: list[Refit]) -> list[Refit]:
+    """Laws, those that act in a blob tried where the best one does too and kept where they say more there; best first.
+
+    What a law does is in proportion to its strength only where it is weak: a lump so stiff that it moves as one shows
+    beside where it is, and the lattice's best place of the right law may be farther off than that of another.
+    """
+    first = refits[0].finding.hypothesis
+    if not first.in_blob:
+        return refits
+
+    def there(one: Refit, _worker: int) -> Refit:
+        blobs = [f for f in laws[one.term].findings if f.hypothesis.in_blob]
+        near = min(blobs, key=lambda f: (first.apart(f.hypothesis), -f.gain), default=None)
+        if near is None or near is laws[one.term].best:
+            return one
+        other = refit(case, *sharpened(case, laws[one.term], case.z, near), case.z)
+        return max(one, other, key=lambda r: r.log_evidence)
+
+    found = [refits[0], *at_once(there, refits[1:], case.workers)]
+    return sorted(found, key=lambda r: -r.log_evidence)
 
 
 def first_look(
@@ -189,24 +213,20 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     whiten = whitener(noise, clip.rest, clip.seen[:, fitted], settings.offsets)
     drift = nuisance.drift_of(clip, noise, settings.offsets)
 
-    def beside(clip: Clip, x: np.ndarray, simulated: np.ndarray, sits: np.ndarray, first: bool) -> np.ndarray:
-        error = nuisance.error_of(clip, x, simulated, memo, settings)
-        if first:
-            # How a body of other numbers rings says nothing of how this one does.
-            error = error * nuisance.held(clip)[None, :, None]
-        groups = nuisance.of_base(clip, simulated, error, sits, drift, noise, settings)
-        return whitened(whiten, groups, until)
+    def beside(clip: Clip, simulated: np.ndarray, gradient: np.ndarray, error: np.ndarray) -> np.ndarray:
+        return whitened(whiten, nuisance.of_base(clip, simulated, error, gradient, drift, noise, settings), until)
 
-    clip, base = fit_base(
-        clip, whiten, beside, memo, workers=workers(clip, settings), timing="release" not in settings.without,
-        begun=begun, say=lambda text: progress(0.1, 1, text),
+    exact = settings.model_error == 0 or "simulator" in settings.without
+    clip, base, fine = fit_base(
+        clip, whiten, beside, memo, finer=None if exact else nuisance.FINER * settings.grid,
+        workers=workers(clip, settings), timing="release" not in settings.without, begun=begun,
+        say=lambda text: progress(0.1, 1, text),
     )  # fmt: skip
-    error = nuisance.error_of(clip, base.x, base.simulated, memo, settings)
-    groups = nuisance.of_laws(clip, base, error, drift, noise, memo, settings, workers(clip, settings))
+    groups = nuisance.of_laws(clip, base, drift, noise, memo, settings, workers(clip, settings))
     fixed = whitened(whiten, groups, until)
     space = metric(np.concatenate([fixed, whiten(base.slopes).T], 1))
     slopes = slice(fixed.shape[1], fixed.shape[1] + len(base.slopes))
-    base = settled(clip, whiten, space, slopes, base, memo)
+    clip, base = settled(clip, fine, whiten, space, slopes, base, memo)
     z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
     drawn = nulls(space, whiten, settings)
     return Case(clip, settings, noise, whiten, base, space, memo, z, drawn, slopes, groups, drift)
@@ -254,9 +274,9 @@ def from_rest(case: Case, best: Refit, z: np.ndarray) -> bool:
     return found - rest > calibration.THRESHOLD
 
 
-def sharpened(case: Case, law: Score, z: np.ndarray) -> tuple[Finding, float]:
-    """A law's best finding on two finer lattices, and the law's evidence with what that gains."""
-    best = law.best
+def sharpened(case: Case, law: Score, z: np.ndarray, start: Finding | None = None) -> tuple[Finding, float]:
+    """A law's best finding, or the best near `start`, on two finer lattices, and the law's evidence there."""
+    best = start or law.best
     residual, seen = case.space.cleared(z[:, None]), case.clip.seen[:, : case.clip.until]
     for step in (1.0, 0.5):
         for block in finer(case.clip, case.base, best.hypothesis, step):
@@ -313,6 +333,6 @@ def another(case: Case, first: Refit) -> Refit | None:
     found = search(left, z, case.nulls, lambda *_: None)
     laws = by_law([f for f in found if f.hypothesis.term != first.term])
     best = max(laws, key=lambda term: laws[term].evidence)
-    if laws[best].evidence < threshold(laws, case.settings):
+    if laws[best].evidence < max(calibration.THRESHOLD, threshold(laws, case.settings)):
         return None
     return refit(left, *sharpened(left, laws[best], z), z)

@@ -17,8 +17,7 @@ def residual(case, simulated, nan: bool = True, rest_only: bool = True) -> np.nd
     clip = case.clip
     left = np.where(clip.seen[..., None], clip.moved - simulated, 0.0)
     if case.settings.offsets:
-        held = clip.motion.active.any(0) if len(clip.motion.active) else np.zeros(clip.frames, bool)
-        rest, fitted = slice(0, int(held.argmax())), slice(0, clip.until)
+        rest, fitted = slice(0, int(clip.held.argmax())), slice(0, clip.until)
         (constant, count), (instead, _) = (_mean(left, clip.seen, span) for span in (rest, fitted))
         resting = (count >= LEAST) & rest_only
         left = left - np.where(resting[:, None], constant, instead)[:, None]
@@ -41,13 +40,18 @@ def rms(case, simulated) -> tuple[float, float | None]:
     return fitted, 1e3 * float(np.sqrt(np.nanmean(square[:, until:])))
 
 
+def noise_floor(sigma: float) -> float:
+    """RMS distance [mm] of a point from where noise of `sigma` [m] along each axis shows it."""
+    return 1e3 * float(np.sqrt(3)) * sigma
+
+
 def errors(case, before, after, placebo, sigma: float) -> tuple[dict, dict]:
     """What diagnosis.json says of fitted frames and of those held out; placebo None where there is none.
 
     before, after, placebo: predicted displacement of the points [m], (K, T, 3).
     """
     clip, until = case.clip, case.clip.until
-    floor = 1e3 * np.sqrt(3) * sigma
+    floor = noise_floor(sigma)
     rows = {name: rms(case, s) for name, s in (("before", before), ("after", after))}
     rows["placebo"] = (None, None) if placebo is None else rms(case, placebo)
     left = residual(case, before, False)
@@ -61,9 +65,7 @@ def errors(case, before, after, placebo, sigma: float) -> tuple[dict, dict]:
         parts.append(1e3 * float(np.sqrt(((left[:, span] - smooth)[seen] ** 2).sum(-1).mean())))
     result = []
     for k in (0, 1):
-        result.append(
-            {"noise_floor": float(floor), **{n: r[k] for n, r in rows.items()}, "flexible": parts[k], "unit": "mm"}
-        )
+        result.append({"noise_floor": floor, **{n: r[k] for n, r in rows.items()}, "flexible": parts[k], "unit": "mm"})
     low, high = bootstrap(case, before, after)
     result[1]["gain_low"], result[1]["gain_high"] = low, high
     return result[0], result[1]

@@ -27,6 +27,14 @@ class Hypothesis:
     scope: str = "everywhere"
     """What kind of place it was tried at: "everywhere", in a "blob", a "layer", a "patch" of the base, at a "grip"."""
 
+    @property
+    def in_blob(self) -> bool:
+        return self.scope == "blob"
+
+    def apart(self, other: "Hypothesis") -> float:
+        """Distance between two blobs' centres [m]."""
+        return float(np.linalg.norm(np.subtract(self.place.center, other.place.center)))
+
 
 def ease(s: np.ndarray) -> np.ndarray:
     s = np.clip(s, 0, 1)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from surgisim.diagnosis.base import values_on
 from surgisim.diagnosis.form import Block
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.law import Law
@@ -37,8 +38,8 @@ def stiffness_of(amplitude: float) -> float:
 
 def stiffer(look: Look, name: str, wheres: Sequence[Where]) -> Block:
     """The tissue's own stress once more, at each of the places."""
-    base = look.base
-    return block(name, [followed(look, lambda F: base_piola(base.prepared, base.values, F), wheres)], wheres, 0, [{}])
+    prepared, values = look.base.prepared, values_on(look.clip, look.base.x)
+    return block(name, [followed(look, lambda F: base_piola(prepared, values, F), wheres)], wheres, 0, [{}])
 
 
 def interval(key: str, value: float, spread: Spread) -> tuple[float, float]:

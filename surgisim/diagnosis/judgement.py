@@ -14,7 +14,7 @@ from scipy.special import expit
 from surgisim.diagnosis import calibration, candidates
 from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.context import Case
-from surgisim.diagnosis.errors import bootstrap, residual, rms
+from surgisim.diagnosis.errors import bootstrap, noise_floor, residual, rms
 from surgisim.diagnosis.evidence import Scores
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint, least, prediction
@@ -54,6 +54,11 @@ class Explanation:
         return self.log_evidence + (0.0 if self.ahead is None else 0.5 * self.ahead.value)
 
     @property
+    def enough(self) -> bool:
+        """Whether its evidence suffices to name it."""
+        return self.support >= calibration.THRESHOLD
+
+    @property
     def loose(self) -> bool:
         """Whether a push, which follows whatever comes and goes, leaves more than one that is there would."""
         law = candidates.of(self.first.finding.hypothesis)
@@ -67,7 +72,7 @@ class Explanation:
     @property
     def sound(self) -> bool:
         """Whether nothing speaks against it but what has not been seen."""
-        return not (self.refuted or self.loose or self.drawn) and self.support > calibration.THRESHOLD
+        return self.enough and not (self.refuted or self.loose or self.drawn)
 
     @property
     def refuted(self) -> bool:
@@ -227,36 +232,34 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
 def _unfit(case: Case, fitted: Joint, noise: Noise) -> bool:
     """Whether frames held out are farther off than a recording is beside what it holds."""
     left = rms(case, fitted.moved)[1]
-    return left is not None and left > calibration.UNFIT * 1e3 * np.sqrt(3) * noise.sigma
+    return left is not None and left > calibration.UNFIT * noise_floor(noise.sigma)
 
 
 def _reason(
     case: Case, chosen: Explanation, chance: float, explained: float, took: float, unfit: bool, over: Gain | None
 ) -> str:
     """Why it is named, or not; chance: its probability among all laws."""
-    evidence, enough = chosen.log_evidence, chosen.support >= calibration.THRESHOLD
-    seen = took >= calibration.TAKEN
-    if not case.settings.calibrated:
-        evidence, enough, seen = np.inf, True, True
-    certain = evidence >= calibration.CLEAR or case.overstretched
+    free = not case.settings.calibrated
+    clear = free or chosen.log_evidence >= calibration.CLEAR
+    seen = free or took >= calibration.TAKEN
+    # What takes nothing off and is contradicted by frames held out is not certain to be anything.
+    certain = case.overstretched or (clear and (seen or chosen.support >= calibration.CLEAR))
     if not certain and not seen:
         return "faint"
     if chosen.loose:
         return "loose"
     if chosen.drawn:
         return "drawn"
-    # What is not believed says that something is hidden only where that is certain.
-    if chosen.refuted:
-        return "refuted" if certain else "faint"
     # A smooth field follows what grid and mesh have wrong too: what frames held out confirm need not explain all of it.
     much = seen and (explained >= calibration.EXPLAINED or chosen.confirmed)
-    if not (enough and much):
-        return "little" if certain else "faint"
-    if unfit:
-        return "unfit" if certain else "faint"
+    doubts = {"refuted": chosen.refuted, "little": not much or not (free or chosen.enough), "unfit": unfit}
+    doubt = next((reason for reason, holds in doubts.items() if holds), None)
+    if doubt:
+        # What is not believed says that something is hidden only where that is certain.
+        return doubt if certain else "faint"
     if chosen.visible and not chosen.confirmed:
         return "unconfirmed"
-    if not chosen.visible and evidence < calibration.CLEAR and chance < calibration.SURE:
+    if not chosen.visible and not clear and chance < calibration.SURE:
         # The fitted frames alone speak, and not for it alone.
         return "unconfirmed"
     if over is not None and over.refuted:
@@ -279,7 +282,7 @@ def nothing(case: Case, laws: Scores, took: float | None = None) -> Judgement:
 def probabilities(laws: Scores, tried: list[Explanation]) -> dict[str, float]:
     """Law -> probability; what is missing to 1 is nothing, or a law that nobody thought of."""
     best = max(e.fitted.gain for e in tried)
-    heat = calibration.TEMPERATURE + calibration.MISFIT * max(best, 0.0)
+    heat = calibration.temperature(calibration.TEMPERATURE, best)
     logs = {term: score.evidence for term, score in laws.items()}
     run: dict[str, float] = {}
     for e in tried:
@@ -297,7 +300,7 @@ def _shares(logs: dict[str, float], none: float) -> dict[str, float]:
 
 def alone(r: Refit) -> float:
     """Probability of a law for itself, beside what else is named."""
-    heat = calibration.TEMPERATURE + calibration.MISFIT * max(r.gain, 0.0)
+    heat = calibration.temperature(calibration.TEMPERATURE, r.gain)
     return float(expit((r.log_evidence - calibration.THRESHOLD) / heat))
 
 

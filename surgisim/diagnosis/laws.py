@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from surgisim.diagnosis import candidates
-from surgisim.diagnosis.base import SAFETY, Base, boldly, carried
+from surgisim.diagnosis.base import SAFETY, Base, boldly, carried, values_on
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.knobs import turned
@@ -56,7 +56,7 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
     base: its x may be followed by moments of release, (3 + R,).
     """
     frames, clip = frames or clip.frames, clip.opens(base.x[3:])
-    values = {**base.values, **law.values}
+    values = {**values_on(clip, base.x), **law.values}
     motion = clip.motion if law.motion is None else law.motion
 
     def make() -> dict[str, np.ndarray]:
@@ -83,9 +83,7 @@ def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = N
 
     moved = None if law.motion is None else np.round(law.motion.position, 9).tolist()
     where = {n: [list(p.center), p.extent, p.normal] for n, p in law.places.items()}
-    return memo(["law", base.x[:3].tolist(), values, _plain(where), moved, frames, *clip.kind], make)["seen"].astype(
-        float
-    )
+    return memo(["law", values, _plain(where), moved, frames, *clip.kind], make)["seen"].astype(float)
 
 
 def steps(clip: Clip, prepared: Prepared, theta: np.ndarray, safety: float = SAFETY) -> int:

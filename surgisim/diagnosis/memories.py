@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surgisim.diagnosis.base import values_on
 from surgisim.diagnosis.look import Look
 from surgisim.diagnosis.scopes import Where
 from surgisim.diagnosis.tangent import base_piola
@@ -46,7 +47,7 @@ def strained(look: Look) -> Strained:
         still[0] = False
         stress = np.empty_like(F)
         for t in range(len(F)):
-            stress[t] = stress[t - 1] if still[t] else base_piola(base.prepared, base.values, F[t])
+            stress[t] = stress[t - 1] if still[t] else base_piola(base.prepared, values_on(look.clip, base.x), F[t])
         return Strained(F, stress, still)
 
     return look.once("strained", None, make)
@@ -63,7 +64,7 @@ def followed(
 
     row: the law's columns; fades: whether its memory goes on changing where tissue stands still.
     """
-    x = look.base.x.tolist()
+    x = look.clip.on_grid(look.base.x).tolist()
     kept = look.memo(["followed", x, term, row], lambda: _patterns(_stresses(look, term, row, stress, fades)))
     patterns, courses = kept["patterns"].astype(float).reshape(-1, len(look.rest), 3, 3), kept["courses"]
     near, weights = look.base.tangent, np.stack([w.weight(look.rest) for w in wheres])

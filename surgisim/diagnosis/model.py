@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from surgisim.artifacts.physics import Physics
-from surgisim.diagnosis import candidates
-from surgisim.diagnosis.base import Base
+from surgisim.diagnosis import candidates, nuisance
+from surgisim.diagnosis.base import Base, values_of
 from surgisim.diagnosis.laws import law_of, steps
 from surgisim.physics.catalogue import choose
 
@@ -26,19 +26,22 @@ def base_numbers(base: Base) -> dict:
 
 
 def physics(case, refits) -> Physics:
-    """The base's laws and the named ones, with the grid and a stable step."""
+    """The base's laws and the named ones, with the grid on which their numbers hold and a stable step."""
     clip, base = case.clip, case.base
+    if clip.error is not None:
+        clip = clip.laid(share=nuisance.FINER * case.settings.grid)
     if refits and refits[0].x is not None:
         base = replace(base, x=refits[0].x[:3], known=refits[0].known or base.known)
-    values, where, known = dict(base.values), {}, base_numbers(base)
+    own, where, known = values_of(base.x), {}, base_numbers(base)
+    values = dict(own)
     for r in refits:
         h, law = r.finding.hypothesis, law_of(r.finding.hypothesis, r.amplitude, clip)
         modelled = candidates.of(h).modelled
-        own = law.values if modelled is None else modelled(h, r.amplitude)
-        if set(own) & set(values):
+        mine = law.values if modelled is None else modelled(h, r.amplitude)
+        if set(mine) & set(values):
             # A body has each law once: where the second effect needs the first one's again, the first stays.
             continue
-        values |= own
+        values |= mine
         where |= law.places
     prepared = clip.prepared(tuple(values))
     step = 1 / clip.fps / steps(clip, prepared, prepared.theta(values, where))
@@ -53,7 +56,7 @@ def physics(case, refits) -> Physics:
     terms = {
         name: {
             key: {"value": float(value), "unit": term.params[key].unit}
-            | {k: known[key][k] for k in ("low", "high") if name in base.values and key in known}
+            | {k: known[key][k] for k in ("low", "high") if name in own and key in known}
             for key, value in values[name].items()
         }
         for name, term in choose(values).items()

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis.base import HELD, Base, by_held, by_place, tracks_of
+from surgisim.diagnosis.base import HELD, Base, by_held, displacement_gradient, tracks_of
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import hats, plane
 from surgisim.diagnosis.memo import Memo
@@ -52,12 +52,11 @@ FAR_OFF = 0.8e-3
 """Beyond which what is held is laid anew [m]."""
 FINER = 0.79
 """Spacing of the finer grid that tells the simulator's error, over that of the search."""
-WHOLE, APART, BENT, ASKEW = 1.5, 0.75, 0.5, 0.3
-"""Of the simulator's error over the difference that a finer grid makes: of all of it, of what tissue does while held
-and after apart, of a factor that varies over the tissue, and of what points elsewhere. Halving a grid's spacing takes
-off 3/4 of an error of second order, 1/2 of one of first: the difference to FINER is .4 to .2 of the whole, but what is
-left out of the search (points near a grip) is where it is largest; engine and other people's elements agree to .05 of
-.22 mm with one free factor near 1."""
+WHOLE, APART, BENT, ASKEW = 0.5, 0.5, 0.5, 0.3
+"""Of what is left of the simulator's error over the difference that a finer grid makes beside stiffer numbers
+(`Clip.error`), once that is taken off: of all of it, of what tissue does while held and after apart, of a factor that
+varies over the tissue, and of what points elsewhere. Together about as large as that difference: of three recordings
+that conceal nothing, at their true numbers, .8, 1.0 and 1.4 of it is left while held and .8, .8 and 1.4 once let go."""
 ALIKE = 1.4
 """Distance over which such a factor is alike, in cells."""
 PATTERNS = 14
@@ -78,29 +77,28 @@ class Group:
 
 
 def of_base(
-    clip: Clip, simulated: np.ndarray, error: np.ndarray, by_place: np.ndarray, drift: float, noise: Noise,
+    clip: Clip, simulated: np.ndarray, error: np.ndarray, gradient: np.ndarray, drift: float, noise: Noise,
     settings: Diagnosing,
 ) -> list[Group]:  # fmt: skip
     """What a base is fitted with.
 
-    error: what a finer grid changes [m], (K, T, 3); by_place: how displacement changes with where points sit [1],
-    (3, K, T, 3); drift: its size [m].
+    error: what a finer grid changes [m], (K, T, 3); gradient: displacement's [1], (3, K, T, 3); drift: its size [m].
     """
-    groups = [*camera(clip, simulated), drifting(clip, drift), places(clip, by_place, noise)]
+    groups = [*camera(clip, simulated), drifting(clip, drift), places(clip, gradient, noise)]
     return chosen([*groups, simulator(clip, error, settings.model_error)], settings)
 
 
 def of_laws(
-    clip: Clip, base: Base, error: np.ndarray, drift: float, noise: Noise, memo: Memo, settings: Diagnosing,
-    workers: int,
-) -> list[Group]:  # fmt: skip
+    clip: Clip, base: Base, drift: float, noise: Noise, memo: Memo, settings: Diagnosing, workers: int
+) -> list[Group]:
     """What laws are fitted with: the same, and grips, held tissue and elastic laws that may be others."""
     near, moved = base.tangent, HELD * by_held(clip, base.x, base.simulated, memo)
     groups = [*other_bodies(clip, base, memo, workers), firmness(clip, near), path(clip, near), closing(clip, near)]
     if moved.any():
         groups.append(Group("held", moved[None], (("where what is held ends", HELD, "m"),)))
-    sits = by_place(base.prepared, clip, base.run)
-    return of_base(clip, base.simulated, error, sits, drift, noise, settings) + chosen(groups, settings)
+    gradient = displacement_gradient(base.prepared, clip, base.run)
+    error = np.zeros_like(base.simulated) if clip.error is None else clip.error
+    return of_base(clip, base.simulated, error, gradient, drift, noise, settings) + chosen(groups, settings)
 
 
 def chosen(groups: list[Group], settings: Diagnosing) -> list[Group]:
@@ -141,19 +139,19 @@ def camera(clip: Clip, simulated: np.ndarray) -> list[Group]:
     return [Group("lag", LAG * velocity[None], (("tracker lag", LAG, "s"),)), Group("scale", scales, named)]
 
 
-def places(clip: Clip, by_place: np.ndarray, noise: Noise) -> Group:
+def places(clip: Clip, gradient: np.ndarray, noise: Noise) -> Group:
     """Where points sit on the body: tissue beside them moves otherwise.
 
-    by_place: how displacement changes with it [1], (3, K, T, 3).
+    gradient: displacement's at the points [1], (3, K, T, 3).
     """
     sigma = noise.sigma * noise.level / np.sqrt((noise.level**2).mean())
     found = []
-    for k, slope in enumerate(np.moveaxis(by_place, 1, 0)):
+    for k, slope in enumerate(np.moveaxis(gradient, 1, 0)):
         seen = slope[:, clip.seen[k]].reshape(3, -1)
         worth, ways = np.linalg.eigh(PLACE**2 * seen @ seen.T)
         found += [(w, k, PLACE * sigma[k] * np.tensordot(way, slope, 1)) for w, way in zip(worth, ways.T, strict=True)]
     found = sorted((one for one in found if one[0] > SLIGHT), key=lambda one: -one[0])[:MOST_PLACES]
-    columns = np.zeros((len(found), *by_place.shape[1:]))
+    columns = np.zeros((len(found), *gradient.shape[1:]))
     for column, (_, k, moved) in zip(columns, found, strict=True):
         column[k] = moved
     return Group("place", columns)
@@ -198,16 +196,6 @@ def drift_of(clip: Clip, noise: Noise, offsets: bool) -> float:
     return float(np.sqrt((weight * DRIFTS**2).sum() / weight.sum()))
 
 
-def error_of(clip: Clip, x: np.ndarray, simulated: np.ndarray, memo: Memo, settings: Diagnosing) -> np.ndarray:
-    """What a finer grid changes in a base's tracks [m], (K, T, 3); zero where the engine breaks down on it."""
-    if settings.model_error == 0 or "simulator" in settings.without:
-        return np.zeros_like(simulated)
-    try:
-        return tracks_of(clip.laid(share=FINER * settings.grid), x, memo) - simulated
-    except Breakdown:
-        return np.zeros_like(simulated)
-
-
 def simulator(clip: Clip, error: np.ndarray, share: float = 1.0) -> Group:
     """The simulator's own error, known by what a finer grid changes [m], (K, T, 3): like it, and of its size.
 
@@ -217,7 +205,7 @@ def simulator(clip: Clip, error: np.ndarray, share: float = 1.0) -> Group:
         return Group("simulator", np.zeros((0, *error.shape)))
     error = share * error
     alike, patterns = _factors(clip)
-    held_then = held(clip)
+    held_then = clip.held
     spans = [span for span in (held_then, ~held_then) if (error * span[None, :, None]).any()]
     result = [WHOLE * error, *(APART * error * span[None, :, None] for span in spans)]
     result += [BENT * error * p[:, None, None] for p in patterns]
@@ -243,11 +231,6 @@ def _askew(error: np.ndarray, spans: list[np.ndarray], alike: np.ndarray, patter
         course = np.sqrt(square.mean(0) / max(square.mean(0)[span].mean(), 1e-30))
         result += [ASKEW * (p * size)[:, None, None] * course[None, :, None] * e for p in patterns for e in np.eye(3)]
     return result
-
-
-def held(clip: Clip) -> np.ndarray:
-    """Frames in which a grip holds, (T,) bool."""
-    return clip.motion.active.any(0) if len(clip.motion.active) else np.zeros(clip.frames, bool)
 
 
 def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group]:

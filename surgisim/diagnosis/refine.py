@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.diagnosis import calibration, candidates
-from surgisim.diagnosis.base import SPREAD, START, Known, bounded
+from surgisim.diagnosis.base import SPREAD, START, Known, bounded, softness
 from surgisim.diagnosis.clip import OPENS
 from surgisim.diagnosis.knobs import Start, turned
 from surgisim.diagnosis.laws import IMPOSSIBLE, Law, beside, joined, law_of, respond
@@ -141,12 +141,12 @@ def refined(
         response = respond(clip, replace(base, x=there), law, case.memo) - base.simulated
     except IMPOSSIBLE:
         return None
-    heat = calibration.ALIKE_ERRORS + calibration.MISFIT * max(nothing - best, 0.0)
+    heat = calibration.temperature(calibration.ALIKE_ERRORS, nothing - best)
     spread = np.linalg.inv((normal - np.eye(len(x))) / heat + np.eye(len(x)))
     rng = np.random.default_rng([case.settings.seed, 3])
     near = rng.multivariate_normal(x, spread, DRAWS)
     others = aside(begun, heat) if begun else np.zeros((DRAWS, 3))
     near[:, own : own + 3] += others / SPREAD
     laws = [list(d) for d in zip(*(all_turned(one)[0] for one in near), strict=True)]
-    known = Known(spread[own : own + 3, own : own + 3] * np.outer(SPREAD, SPREAD), others)
+    known = Known(spread[own : own + 3, own : own + 3] * np.outer(SPREAD, SPREAD) + softness(clip), others)
     return Refined(all_turned(x)[0], laws, there, known, response, nothing - best)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.diagnosis import candidates
-from surgisim.diagnosis.base import BOLD, Known
+from surgisim.diagnosis.base import BOLD, Known, values_on
 from surgisim.diagnosis.base_fit import without
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
@@ -120,5 +120,5 @@ def kept(case, one: Refit) -> Refit:
 def fit_of_a_law(case) -> float:
     """Particles times steps that a law with everything about it free takes, roughly."""
     base = case.base
-    steps = base.prepared.per_frame(base.values, case.clip.fps, BOLD) * case.clip.until
+    steps = base.prepared.per_frame(values_on(case.clip, base.x), case.clip.fps, BOLD) * case.clip.until
     return RUNS * len(base.prepared.simulator.rest) * steps

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surgisim.diagnosis import calibration
-from surgisim.diagnosis.base import SPREAD, START, bounded, carried, run_base, values_of
+from surgisim.diagnosis.base import SPREAD, START, bounded, carried, run_base, values_on
 from surgisim.diagnosis.clip import OPENS, Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric
@@ -102,7 +102,7 @@ class RingDown:
         clip = self.clip.opens(y[3:])
         result = self.simulated.copy()
         for first, last in windows(self.clip):
-            what = ["short", self.x.tolist(), rates.tolist(), first, last, *clip.kind]
+            what = ["short", clip.on_grid(self.x).tolist(), clip.on_grid(rates).tolist(), first, last, *clip.kind]
             seen = self.memo(what, lambda f=first, t=last: {"seen": self._short(clip, self.bodies[body], rates, f, t)})[
                 "seen"
             ]
@@ -111,7 +111,8 @@ class RingDown:
 
     def _short(self, clip: Clip, body: Prepared, rates: np.ndarray, first: int, last: int) -> np.ndarray:
         before = self.run if first else None
-        return carried(self.carry, run_base(body, clip, values_of(rates), before=before, first=first, last=last))[:, 1:]
+        run = run_base(body, clip, values_on(clip, rates), before=before, first=first, last=last)
+        return carried(self.carry, run)[:, 1:]
 
     def left(self, y: np.ndarray, body: int = 0) -> np.ndarray | None:
         """Whitened residual, (N,); None where tissue like that is torn apart."""
@@ -180,15 +181,19 @@ class RingDown:
         for steps, keep in (*KEPT, (DESCENTS, 0)):
             for each in going:
                 self.descend(each, say, steps)
-            going = sorted(going, key=lambda d: d.cost)
-            single: list[Descent] = []
-            for each in going:
-                away = [np.abs((each.y - other.y) / self.reach).max() for other in single]
-                if min(away, default=np.inf) > SAME:
-                    single.append(each)
+            single = self.distinct(going, SAME)
             ended += single[keep:]
             going = single[:keep]
         return sorted(ended, key=lambda d: d.cost)
+
+    def distinct(self, ends: list[Descent], apart: float) -> list[Descent]:
+        """The best of those that lie within so many prior standard deviations of one another, best first."""
+        single: list[Descent] = []
+        for each in sorted(ends, key=lambda d: d.cost):
+            away = [np.abs((each.y - other.y) / self.reach).max() for other in single]
+            if min(away, default=np.inf) > apart:
+                single.append(each)
+        return single
 
     def descend(self, at: Descent, say: Callable[[str], None], steps: int = DESCENTS) -> None:
         """Levenberg-Marquardt, some steps on."""
@@ -230,10 +235,8 @@ def softest(ends: list[Descent]) -> Descent:
 
 
 def aside(ends: list[Descent], heat: float = calibration.ALIKE_ERRORS) -> np.ndarray:
-    """How far x is from the chosen body where descents ended, each drawn as often as its chi square says, (DRAWS, 3).
-
-    heat: by which chi square is divided.
-    """
+    """How far x is from the chosen body where descents ended, each drawn as often as its chi square, divided by
+    `heat`, says, (DRAWS, 3)."""
     chosen = softest(ends)
     weight = np.exp(-0.5 * np.maximum([d.cost - chosen.cost for d in ends], 0) / heat)
     drawn = np.random.default_rng(0).choice(len(ends), DRAWS, p=weight / weight.sum())

@@ -15,6 +15,8 @@ def drawn(case: Case, rng: np.random.Generator) -> np.ndarray:
     """Displacement of the points as a case's model of noise and nuisances has it [m], (K, T, 3)."""
     clip, base = case.clip, case.base
     moved = base.simulated + case.noise.draw(clip.rest, clip.frames, rng)
+    if clip.error is not None:
+        moved = moved + clip.error
     for group in case.groups:
         moved = moved + np.tensordot(rng.standard_normal(len(group.columns)), group.columns, (0, 0))
     near = np.sqrt(np.diag(base.known.near)) / SPREAD

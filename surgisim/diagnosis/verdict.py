@@ -65,7 +65,8 @@ def write(
     members = [*said_of.accepted, *said_of.others]
     effects = [_effect(case, r, chances, {m.term for m in members}) for r in members]
     noise, explained = said_of.noise, said_of.explained
-    fit, held_out = errors(case, shown.before, shown.after, shown.placebo, noise.sigma)
+    on_shown = replace(case, clip=shown.clip)
+    fit, held_out = errors(on_shown, shown.before, shown.after, shown.placebo, noise.sigma)
     say("verdict")
     z, reach = symptom(clip, noise, residual(case, base.simulated, False, rest_only=False), rng)
     freed = case.z - case.space.explained(case.z)
@@ -113,8 +114,8 @@ def write(
     )
     mismatch = Mismatch(
         points=clip.rest,
-        residual_before=residual(case, shown.before),
-        residual_after=residual(case, shown.after),
+        residual_before=residual(on_shown, shown.before),
+        residual_after=residual(on_shown, shown.after),
         z=z,
         significant=reach,
         particles=base.prepared.simulator.rest,
@@ -122,12 +123,13 @@ def write(
         cause_time=np.concatenate([when, np.zeros(clip.frames - clip.until)]),
         phase=clip.phases(),
     )
-    return diagnosis, physics(replace(case, clip=shown.clip), said_of.accepted if named else []), mismatch
+    return diagnosis, physics(on_shown, said_of.accepted if named else []), mismatch
 
 
 def worse(case: Case, shown: Replay) -> bool:
     """Whether the error of the frames held out rises with what is named, by more than its interval."""
-    high = errors(case, shown.before, shown.after, None, case.noise.sigma)[1]["gain_high"]
+    on_shown = replace(case, clip=shown.clip)
+    high = errors(on_shown, shown.before, shown.after, None, case.noise.sigma)[1]["gain_high"]
     return high is not None and high < 0
 
 

@@ -35,10 +35,10 @@ def block() -> Mesh:
     return Mesh(corner, np.array(faces))
 
 
-def recording(values=None, places=None, seed=0, sigma=1.5e-4, fps=FPS, late=0.0) -> Recording:
+def recording(values=None, places=None, seed=0, sigma=1.5e-4, fps=FPS, late=0.0, share=GRID) -> Recording:
     """Pulled up and sideways from frame 4, held, let go at 17; `values` and `places` are what is planted.
 
-    late: how many frames after the last active one the grip opens.
+    late: how many frames after the last active one the grip opens; share: of the grid that it is recorded on.
     """
     rng = np.random.default_rng(seed)
     side = np.stack(np.meshgrid(np.linspace(-0.016, 0.016, 8), np.linspace(-0.013, 0.013, 6)), -1).reshape(-1, 2)
@@ -56,7 +56,7 @@ def recording(values=None, places=None, seed=0, sigma=1.5e-4, fps=FPS, late=0.0)
         visible=np.ones((len(rest), FRAMES), bool), sigma=np.full(len(rest), sigma), motion=motion, density=1050.0,
         gravity=(0.0, 0.0, -9.81), place=rest, split={"fit": (0, FIT), "held_out": (FIT, FRAMES)},
     )  # fmt: skip
-    clip = clip_of(made, share=GRID)
+    clip = clip_of(made, share=share)
     values = {**values_of(TRUE), **(values or {})}
     prepared = clip.prepared(tuple(values))
     theta = prepared.theta(values, places or {})

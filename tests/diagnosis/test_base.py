@@ -9,12 +9,13 @@ from planted import GRID, TRUE, case_of, memo_of, plain, recording
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import base_fit as fitting
 from surgisim.diagnosis import ring_down
-from surgisim.diagnosis.base import START, TERMS, Known
-from surgisim.diagnosis.calibration import ALIKE_ERRORS
+from surgisim.diagnosis.base import SPREAD, START, Known, tracks_of
+from surgisim.diagnosis.calibration import ALIKE_ERRORS, MISFIT
 from surgisim.diagnosis.clip import OPENS, clip_of
 from surgisim.diagnosis.diagnose import prepare_case
 from surgisim.diagnosis.joint import based
 from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.nuisance import FINER
 from surgisim.mpm.simulator import Breakdown
 
 QUICK = 50.0
@@ -33,14 +34,15 @@ def test_ever_stiffer_bodies_are_tried_until_one_stands(monkeypatch):
         return "drive", "run"
 
     monkeypatch.setattr(fitting, "simulate", only_stiff)
+    monkeypatch.setattr(fitting, "carried", lambda carry, run: "tracks")
     clip = clip_of(recording(), share=GRID)
-    x, made = fitting._standing(clip.prepared(TERMS), clip, START, Memo(None, ""), 4)
-    assert made == ("drive", "run")
+    x, made = fitting._standing(fitting.Laid.on(clip, 1), START, Memo(None, ""))
+    assert made == ("drive", "run", "tracks")
     assert tried == pytest.approx([5e3, 1.5e4, 4.5e4])
     assert np.exp(x[0]) == pytest.approx(4.5e4)
     monkeypatch.setattr(fitting, "simulate", lambda *_: (_ for _ in ()).throw(Breakdown("torn apart")))
     with pytest.raises(Breakdown):
-        fitting._standing(clip.prepared(TERMS), clip, START, Memo(None, ""), 4)
+        fitting._standing(fitting.Laid.on(clip, 1), START, Memo(None, ""))
 
 
 @pytest.mark.parametrize(("dearer", "softest"), [(1.5, True), (2.5, False)])
@@ -64,6 +66,19 @@ def test_bodies_that_fit_about_as_well_are_part_of_how_surely_one_is_known():
     known = Known(np.zeros((3, 3)), away(0.0))
     assert known.spread == pytest.approx([np.sqrt(2.0), 0, 0], rel=0.1)
     assert known.draws(soft) == pytest.approx(soft + known.aside)
+
+
+def test_beside_what_nobody_knows_a_base_is_less_surely_known_up_to_what_is_known_beforehand():
+    prior, near = np.diag(SPREAD**2), np.diag((0.1 * SPREAD) ** 2)
+    aside = np.full((4, 3), 0.01)
+    known = Known(near, aside)
+    assert known.beside(0.0).near == pytest.approx(near)
+    assert known.beside(1e9).near == pytest.approx(prior, rel=1e-3)
+    # Where its share of what is left is as much as errors that samples have alike, numbers are told half as surely.
+    there = known.beside(ALIKE_ERRORS / MISFIT)
+    assert np.diag(there.near) == pytest.approx(SPREAD**2 / (1 + 0.5 * 99.0))
+    assert there.aside is aside
+    assert Known(prior, aside).beside(100.0).near == pytest.approx(prior)
 
 
 def test_a_base_is_fitted_anew_where_a_run_fits_worse_than_promised(monkeypatch):
@@ -131,3 +146,44 @@ def test_a_release_taken_to_fall_elsewhere_gives_another_body_that_fits_worse(le
     assert abs(other.base.x[0] - TRUE[0]) > 0.5
     chi = [float(c.space.gram(c.z[:, None], c.z[:, None])[0, 0]) for c in (case, other)]
     assert chi[1] > chi[0] + 100
+
+
+def test_tissue_of_a_finer_grid_is_not_taken_for_a_stiffer_one():
+    made = recording(fps=QUICK, sigma=4e-5, share=FINER * GRID)
+    case, coarse = case_of(made), case_of(made, without=["simulator"])
+    assert coarse.clip.error is None
+    assert coarse.base.x[0] - TRUE[0] > 0.1
+    assert abs(case.base.x[0] - TRUE[0]) < 0.5 * (coarse.base.x[0] - TRUE[0])
+    assert (np.abs(case.base.x - TRUE) < 2.5 * case.base.spread).all()
+    # Runs on the search's grid are compared with what the finer one shows.
+    there = tracks_of(case.clip.laid(share=FINER * GRID), case.base.x, case.memo)
+    assert case.base.simulated + case.clip.error == pytest.approx(there, abs=1e-9)
+
+
+def test_what_a_finer_grid_changes_is_taken_off_once():
+    clip = plain().clip.less(None)
+    error = 1e-3 * np.random.default_rng(3).standard_normal(clip.moved.shape)
+    off = clip.less(2 * error).less(error)
+    assert off.moved == pytest.approx(clip.moved - error * clip.seen[..., None])
+    assert off.less(None).moved == pytest.approx(clip.moved)
+    assert off.laid(share=GRID).error is None
+
+
+def test_stiffer_numbers_make_a_coarse_grid_ring_like_a_finer_one_whatever_the_body():
+    clip, memo, x = clip_of(recording(fps=QUICK), share=GRID), Memo(None, ""), np.append(TRUE[:2], np.log(5e-4))
+    on, finer = (fitting.Laid.on(c.opens(np.zeros(1)), 1) for c in (clip, clip.laid(share=FINER * GRID)))
+    ran = fitting.Ran.at(x, on, finer, plain().whiten, memo)
+    assert ran.clip.stiffer[0] > 0.1
+    for other in (x, x - [0.4, 0.0, 0.0]):
+        there, raised, as_it_is = (laid.run(other, memo)[-1][:, 18:] for laid in (finer, ran.laid, on))
+        assert np.sqrt(((raised - there) ** 2).mean()) < 0.7 * np.sqrt(((as_it_is - there) ** 2).mean())
+    # By how much grids differ in one body says nothing of another.
+    error = finer.run(x, memo)[-1][:, 18:] - on.run(x, memo)[-1][:, 18:]
+    assert ((as_it_is + error - there) ** 2).mean() > ((as_it_is - there) ** 2).mean()
+
+
+def test_what_numbers_are_raised_by_belongs_to_a_spacing():
+    clip = replace(plain().clip, stiffer=np.array([0.2, 0.0, -0.1]))
+    assert clip.on_grid(np.append(TRUE, 0.5)) == pytest.approx(TRUE + clip.stiffer)
+    assert clip.laid(raised=1e-3).on_grid(TRUE) == pytest.approx(clip.on_grid(TRUE))
+    assert clip.laid(share=0.9 * GRID).on_grid(TRUE) == pytest.approx(TRUE)

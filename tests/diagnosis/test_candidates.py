@@ -10,7 +10,7 @@ from planted import plain
 
 from surgisim import diagnosis
 from surgisim.diagnosis import words
-from surgisim.diagnosis.base import carried
+from surgisim.diagnosis.base import TERMS, carried, values_of
 from surgisim.diagnosis.candidates import blocks, catalogue, costly
 from surgisim.diagnosis.knobs import turned
 from surgisim.diagnosis.laws import described, law_of, steps
@@ -75,8 +75,8 @@ def test_a_law_is_tried_and_says_what_the_engine_runs(case, tried, name):
             assert set(numbers) == set(terms()[term].params)
             assert np.isfinite(list(numbers.values())).all()
         if law.values:
-            prepared = case.clip.prepared((*case.base.values, *law.values))
-            assert np.isfinite(prepared.theta({**case.base.values, **law.values}, law.places)).all()
+            prepared = case.clip.prepared((*TERMS, *law.values))
+            assert np.isfinite(prepared.theta({**values_of(case.base.x), **law.values}, law.places)).all()
 
 
 @pytest.mark.parametrize("name", WHOLE_OR_PART)
@@ -103,8 +103,8 @@ def difference(case, much, little) -> np.ndarray:
     energy as if it acted everywhere (mpm/setup.py).
     """
     clip = case.clip
-    prepared = clip.prepared((*case.base.values, *much.values))
-    strong, weak = ({**case.base.values, **law.values} for law in (much, little))
+    prepared = clip.prepared((*TERMS, *much.values))
+    strong, weak = ({**values_of(case.base.x), **law.values} for law in (much, little))
     per_frame = steps(clip, prepared, prepared.theta(strong, much.places))
     drive = prepared.drive(clip.motion, weak, fps=clip.fps, per_frame=per_frame, places=little.places)
     runs = [

@@ -173,6 +173,14 @@ def test_what_leaves_frames_held_out_far_off_is_not_named():
     assert reason(explanation(evidence=CLEAR + 1, ahead=WORSE), unfit=True) == "refuted"
 
 
+def test_what_takes_nothing_off_and_frames_held_out_contradict_is_nothing_however_the_fitted_ones_speak():
+    for ahead, said in ((WORSE, "faint"), (BLIND, "loose"), (None, "loose")):
+        push = explanation("hidden_contact", evidence=CLEAR + 1, ahead=ahead, left=PUSH_LEAVES + 0.1, out=-0.8)
+        assert reason(push, took=0.0) == said
+    push = explanation("hidden_contact", evidence=CLEAR + 1, ahead=WORSE, left=PUSH_LEAVES + 0.1, out=-0.8)
+    assert reason(push, took=2 * TAKEN) == "loose"
+
+
 def test_a_tie_with_a_placebo_is_no_defeat():
     assert [reason(explanation(), over=over) for over in (None, BETTER, ALIKE, BLIND)] == ["named"] * 4
     assert reason(explanation(), over=WORSE) == "beaten"

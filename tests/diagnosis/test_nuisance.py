@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import diagnose, nuisance
-from surgisim.diagnosis.base import by_place, carried, tracks_of
+from surgisim.diagnosis.base import carried, displacement_gradient, tracks_of
 from surgisim.diagnosis.diagnose import whitened
 from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
@@ -105,7 +105,7 @@ def test_points_that_sit_beside_where_they_are_taken_to_be_are_explained(case):
     by = 10 * case.noise.sigma * np.random.default_rng(14).standard_normal(clip.rest.shape)
     off = carried(prepared.simulator.carry(clip.rest + by), run) - case.base.simulated
     white = case.whiten(off[:, :until])[:, None]
-    group = nuisance.places(clip, by_place(prepared, clip, run), loose)
+    group = nuisance.places(clip, displacement_gradient(prepared, clip, run), loose)
     assert 0 < len(group.columns) <= nuisance.MOST_PLACES
     assert (np.abs(group.columns).max((2, 3)) > 0).sum(1).max() == 1
     space = metric(whitened(case.whiten, [group], until))

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from surgisim.diagnosis import knobs, memories
+from surgisim.diagnosis.base import values_on
 from surgisim.diagnosis.candidate import Candidate, Parts
 from surgisim.diagnosis.form import Block
 from surgisim.diagnosis.hypothesis import Hypothesis
@@ -36,7 +37,7 @@ def _block(look: Look, wheres: Sequence[Where], yields: Sequence[float]) -> Bloc
         def stress(F, q, plain, row=row):
             flow = term.twin(q, **row)
             # First Piola against F of a stress that sees F G: J sigma(F G) F^-T.
-            seen = base_piola(base.prepared, base.values, F @ flow) @ np.swapaxes(flow, -1, -2)
+            seen = base_piola(base.prepared, values_on(look.clip, base.x), F @ flow) @ np.swapaxes(flow, -1, -2)
             return (seen - plain) / SMALL
 
         columns.append(memories.followed(look, NAME, row, stress, wheres))
