@@ -24,6 +24,8 @@ START = np.array([np.log(5e3), 0.45, np.log(2e-3)])
 SPREAD = np.array([1.2, 0.03, 1.4])
 LOW, HIGH = np.array([np.log(2e2), 0.30, np.log(5e-5)]), np.array([np.log(1e6), 0.49, np.log(5e-2)])
 NAMES = ("E", "nu", "eta / E")
+INCOMPRESSIBLE = 0.5
+"""Poisson's ratio of what keeps its volume [1]; beyond it, pressure would make tissue larger."""
 HELD = 1e-3
 """Standard deviation of where what is held ends [m]: nobody glues to the millimetre."""
 STEP = 0.05
@@ -61,9 +63,10 @@ class Known:
         return replace(self, near=np.linalg.inv(less * (surer - prior) + prior))
 
     def draws(self, x: np.ndarray) -> np.ndarray:
-        """Numbers that would do, (D, 3)."""
+        """Numbers that would do, none of them incompressible or beyond, (at most D, 3)."""
         near = np.random.default_rng(len(self.aside)).multivariate_normal(np.zeros(3), self.near, len(self.aside))
-        return x[:3] + near + self.aside
+        drawn = x[:3] + near + self.aside
+        return drawn[drawn[:, 1] < INCOMPRESSIBLE]
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,14 @@ def test_bodies_that_fit_about_as_well_are_part_of_how_surely_one_is_known():
     assert known.draws(soft) == pytest.approx(soft + known.aside)
 
 
+def test_no_interval_reaches_a_ratio_at_which_pressure_would_make_tissue_larger():
+    near = np.diag([0.0, 0.03**2, 0.0])
+    drawn = Known(near, np.zeros((400, 3))).draws(np.array([START[0], 0.48, START[2]]))
+    assert 200 < len(drawn) < 400
+    assert drawn[:, 1].max() < 0.5
+    assert drawn[:, 1].min() < 0.42
+
+
 def test_beside_what_nobody_knows_a_base_is_less_surely_known_up_to_what_is_known_beforehand():
     prior, near = np.diag(SPREAD**2), np.diag((0.1 * SPREAD) ** 2)
     aside = np.full((4, 3), 0.01)
