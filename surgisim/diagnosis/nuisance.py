@@ -42,8 +42,8 @@ is worth less chi square than SLIGHT, and beyond the first MOST_PLACES."""
 FIRM = 0.15
 """Of how much more or less than all of its path a grip carries along [1]."""
 RADIUS, HERE, CENTRE, PATH = 0.1, 1.0, 5e-4, 1e-4
-"""Of a grip's radius [1], of a factor of that which varies over the tissue, of its centre [m], and of its path from
-moment to moment [m]."""
+"""Of a grip's radius, and again of all grips' alike [1]; of a factor of that which varies over the tissue [1]; of a
+grip's centre [m], and of its path from moment to moment [m]."""
 SOON = 0.2
 """Of the moment of a release whose frames were fitted, about what came out [frames]: there tracks bend with it."""
 LAWS = ("corotated", "neo_hookean")
@@ -281,7 +281,7 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
             before = groups.get(name, Group(name, np.zeros((0, *change.shape))))
             groups[name] = Group(name, np.concatenate([before.columns, change[None]]), (*before.values, told))
     if "grip radius" in groups:
-        groups["grip radius"] = _not_a_ball(clip, groups["grip radius"])
+        groups["grip radius"] = _of_one_instrument(_not_a_ball(clip, groups["grip radius"]))
     return list(groups.values())
 
 
@@ -299,6 +299,15 @@ def _not_a_ball(clip: Clip, radius: Group) -> Group:
             columns.append(HERE * one * patterns[:, :, None, None])
             columns.append(np.stack(_askew(HERE / ASKEW / 2 * one, [np.ones(clip.frames, bool)], alike, patterns)))
     return replace(radius, columns=np.concatenate(columns))
+
+
+def _of_one_instrument(radius: Group) -> Group:
+    """Grips that are all larger, or all smaller, than said: the same jaws, measured or meshed the same way."""
+    if len(radius.values) < 2:
+        return radius
+    each = [RADIUS / sd * one for one, (_, sd, _) in zip(radius.columns, radius.values, strict=False)]
+    # Behind those that have a name: it is one of none in particular.
+    return replace(radius, columns=np.concatenate([radius.columns, sum(each)[None]]))
 
 
 def firmness(clip: Clip, near) -> Group:

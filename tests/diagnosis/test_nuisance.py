@@ -99,6 +99,22 @@ def test_a_grip_that_the_grid_widens_may_be_smaller_by_as_much(case):
     assert np.abs(group.columns[0]).max() > 1e-4
 
 
+def test_what_the_first_grip_shows_of_the_jaws_holds_for_the_second(case):
+    rng = np.random.default_rng(21)
+    first, second = np.zeros((2, 6, 10, 3))
+    first[:, :5], second[:, 5:] = rng.standard_normal((2, 6, 5, 3))
+    named = (("radius of grip 0", nuisance.RADIUS, "1"), ("radius of grip 1", 2 * nuisance.RADIUS, "1"))
+    radius = nuisance._of_one_instrument(nuisance.Group("grip radius", np.stack([first, 2 * second]), named))
+    assert radius.values == named
+    seen = radius.columns[:, :, :5].reshape(3, -1).T
+    # Both grips are 20 % too small, and fitted frames show the first alone.
+    amount = np.linalg.solve(100 * seen.T @ seen + np.eye(3), 100 * seen.T @ (-2 * first[:, :5]).ravel())
+    foretold = np.tensordot(amount, radius.columns, 1)[:, 5:]
+    assert foretold == pytest.approx(-second[:, 5:], rel=0.02)
+    alone = nuisance.Group("grip radius", first[None], named[:1])
+    assert nuisance._of_one_instrument(alone) is alone
+
+
 def test_points_that_sit_beside_where_they_are_taken_to_be_are_explained(case):
     clip, until, prepared, run = case.clip, case.clip.until, case.base.prepared, case.base.run
     loose = replace(case.noise, level=10 * case.noise.level)
