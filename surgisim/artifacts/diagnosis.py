@@ -46,7 +46,7 @@ class Diagnosis(JsonArtifact):
     """per_frame: chi square over its degrees of freedom, one number or null a frame, with what is named; degrees: those
     degrees of freedom, one number or one a frame."""
     untold: list[str] = field(default_factory=list)
-    """Parameters that end at a bound of what was tried: this recording does not tell them."""
+    """Parameters that this recording does not tell: at a bound of what was tried, or hardly surer than beforehand."""
 
     def __post_init__(self) -> None:
         check(self.verdict in VERDICTS, f"Diagnosis: verdict '{self.verdict}' is none of {VERDICTS}.")

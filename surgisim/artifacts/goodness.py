@@ -59,7 +59,7 @@ def goodness(body: dict[str, Any], where: str) -> Goodness | None:
 
 
 def untold(body: dict[str, Any]) -> tuple[str, ...]:
-    """Parameters that end at a bound of what was tried."""
+    """Parameters that the recording does not tell."""
     return tuple(map(str, _told(body, "untold", "bounds") or ()))
 
 

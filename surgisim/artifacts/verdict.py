@@ -92,7 +92,7 @@ class Verdict:
     nuisances: tuple[Nuisance, ...] = ()
     goodness: Goodness | None = None
     untold: tuple[str, ...] = ()
-    """Parameters at a bound of what was tried."""
+    """Parameters that the recording does not tell."""
 
     @property
     def names(self) -> tuple[str, ...]:

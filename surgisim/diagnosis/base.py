@@ -30,6 +30,8 @@ HELD = 1e-3
 """Standard deviation of where what is held ends [m]: nobody glues to the millimetre."""
 STEP = 0.05
 """Of a cell: step of the differences that a displacement gradient is made of."""
+TOLD = 0.7
+"""Share of the spread that a number has beforehand below which a recording tells it: half of the variance [1]."""
 FINE_ENOUGH = 0.4
 """Of how much softer than tissue a coarse grid is, over how much softer than the finer grid: standard deviation about 1
 [1]."""
@@ -83,12 +85,18 @@ class Base:
     """Of the points by x, at one prior standard deviation [m], (3, K, T_fit, 3)."""
     known: Known
     bound: tuple[str, ...] = ()
-    """Numbers that came to the end of what is tried: the recording does not tell them."""
+    """Numbers that came to the end of what is tried."""
 
     @property
     def spread(self) -> np.ndarray:
         """Posterior standard deviation of x, (3,)."""
         return self.known.spread
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Names of numbers that the recording does not tell: at an end of what is tried, or hardly surer."""
+        vague = self.spread > TOLD * SPREAD
+        return tuple(name for name, v in zip(NAMES, vague, strict=True) if v or name in self.bound)
 
 
 def values_of(x: np.ndarray) -> Values:

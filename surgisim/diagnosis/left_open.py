@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 from scipy.linalg import cho_solve
 
+from surgisim.diagnosis.base import TOLD
 from surgisim.diagnosis.context import Case
+from surgisim.diagnosis.model import base_numbers
 from surgisim.diagnosis.nuisance import span
 
-TOLD = 0.7
-"""Share of its prior spread below which a nuisance is told by the recording."""
 LARGE = 3.0
 """Times the tracking noise's RMS beyond which a camera's drift is worth a sentence."""
 
@@ -79,6 +79,11 @@ def told(case: Case, after: np.ndarray | None = None) -> list[str]:
         said.append(f"What is held seems to end {1e3 * abs(case.clip.raised):.1f} mm {way} its box.")
     for name in case.base.bound:
         said.append(f"{name} came to the end of what is tried: the recording does not tell it.")
+    if "E" in case.base.untold and "E" not in case.base.bound:
+        E = base_numbers(case.base)["E"]
+        said.append(
+            f"E is hardly told: from {1e-3 * E['low']:.2g} to {1e-3 * E['high']:.2g} kPa all fit about as well."
+        )
     return said
 
 

@@ -98,7 +98,7 @@ def write(
         markers=markers(verdict, effects, clip, z),
         nuisances=nuisances(case),
         goodness=goodness(case, said_of.after),
-        untold=list(base.bound),
+        untold=list(case.base.untold),
         base=base_numbers(case.base),
         noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(noise).items()}
         | {"sigma": noise.sigma, "unit": "m"},

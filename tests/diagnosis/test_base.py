@@ -9,7 +9,7 @@ from planted import GRID, TRUE, case_of, memo_of, plain, recording
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import base_fit as fitting
 from surgisim.diagnosis import ring_down
-from surgisim.diagnosis.base import SPREAD, START, Known, tracks_of
+from surgisim.diagnosis.base import SPREAD, START, Base, Known, tracks_of
 from surgisim.diagnosis.calibration import ALIKE_ERRORS, MISFIT
 from surgisim.diagnosis.clip import OPENS, clip_of
 from surgisim.diagnosis.diagnose import prepare_case
@@ -66,6 +66,15 @@ def test_bodies_that_fit_about_as_well_are_part_of_how_surely_one_is_known():
     known = Known(np.zeros((3, 3)), away(0.0))
     assert known.spread == pytest.approx([np.sqrt(2.0), 0, 0], rel=0.1)
     assert known.draws(soft) == pytest.approx(soft + known.aside)
+
+
+def test_what_is_hardly_surer_than_beforehand_is_untold():
+    def untold(*surer, bound=()):
+        return Base(*[None] * 7, Known(np.diag((np.array(surer) * SPREAD) ** 2), np.zeros((4, 3))), bound).untold
+
+    assert untold(0.3, 0.6, 0.5) == ()
+    assert untold(0.8, 0.9, 0.5) == ("E", "nu")
+    assert untold(0.3, 0.9, 0.5, bound=("eta / E",)) == ("nu", "eta / E")
 
 
 def test_no_interval_reaches_a_ratio_at_which_pressure_would_make_tissue_larger():
