@@ -306,7 +306,7 @@ def _of_one_instrument(radius: Group) -> Group:
     if len(radius.values) < 2:
         return radius
     each = [RADIUS / sd * one for one, (_, sd, _) in zip(radius.columns, radius.values, strict=False)]
-    # Behind those that have a name: it is one of none in particular.
+    # Last, since `values` names the first columns.
     return replace(radius, columns=np.concatenate([radius.columns, sum(each)[None]]))
 
 

@@ -1,5 +1,6 @@
 """What a recording leaves open explains itself; noise and nuisances drawn from the model fit it."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,7 +11,7 @@ from scipy.stats import chi2
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import diagnose, nuisance
-from surgisim.diagnosis.base import carried, displacement_gradient, tracks_of
+from surgisim.diagnosis.base import SPREAD, Known, carried, displacement_gradient, tracks_of
 from surgisim.diagnosis.diagnose import whitened
 from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
@@ -126,6 +127,18 @@ def test_points_that_sit_beside_where_they_are_taken_to_be_are_explained(case):
     assert (np.abs(group.columns).max((2, 3)) > 0).sum(1).max() == 1
     space = metric(whitened(case.whiten, [group], until))
     assert space.gram(white, white) < 0.25 * (white**2).sum()
+
+
+def test_a_stiffness_that_is_hardly_told_is_said_with_where_it_may_lie(case):
+    def said(sharper: float) -> list[str]:
+        known = Known(np.diag((SPREAD * [sharper, 0.5, 0.5]) ** 2), np.zeros((400, 3)))
+        return [text for text in told(replace(case, base=replace(case.base, known=known, bound=()))) if "E is" in text]
+
+    assert said(0.5) == []
+    (sentence,) = said(0.9)
+    low, high = (1e3 * float(number) for number in re.findall(r"[\d.]+", sentence)[:2])
+    # 90 % of a spread of .9 times 1.2 in log E lie within a factor of 5.9 either way.
+    assert np.log(high / low) == pytest.approx(2 * 1.645 * 0.9 * SPREAD[0], rel=0.2)
 
 
 def test_a_camera_that_drifts_is_said(case):
