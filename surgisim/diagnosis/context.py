@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis import calibration
+from surgisim.diagnosis import calibration, nuisance
 from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
@@ -16,6 +16,8 @@ from surgisim.diagnosis.nuisance import Group, positions, release, span
 from surgisim.diagnosis.prospect import Prospect, prospect
 from surgisim.diagnosis.saturated import Saturated, SmoothFit, saturated
 
+LAW = 100.0
+"""Length of a law's whitened response at one standard deviation of its strength, where it is weighed beside a drift."""
 ON_A_GPU = 8
 """Runs side by side there: their steps take hardly longer than one's."""
 
@@ -39,15 +41,55 @@ class Case:
     """Where the base's own columns stand in the metric, after those of the groups."""
     groups: list[Group]
     """What a residual may hold beside physics, over the whole clip."""
-    drift: float
-    """How far the camera drifts over the clip, as its rest shows [m]."""
+    drift: np.ndarray
+    """How far the parts of the camera's drift go over the clip [m], (3,)."""
+    behind: float = 0.0
+    """By how much the base alone is less likely with this drift than with the one that suits it best [log evidence].
+    Every law found here owes as much: without it, the camera would have been said to drift."""
 
-    def drifting(self, size: float) -> "Case":
-        """The same where the camera drifts so far over the clip [m]."""
-        return replace(self.open_by("drift", size / self.drift), drift=size)
+    def drifting(self, sizes: np.ndarray) -> "Case":
+        """The same where the camera drifts so far over the clip [m], (3,)."""
+        first, second = (self.likelihood(s) for s in (self.likeliest_drift(), sizes))
+        return replace(
+            self.open_by("drift", nuisance.by_part(sizes / self.drift)), drift=sizes, behind=max(first - second, 0.0)
+        )
 
-    def open_by(self, name: str, times: float) -> "Case":
-        """The same with the prior of one kind of nuisance some times as wide."""
+    def likelihood(self, sizes: np.ndarray, law: np.ndarray | None = None) -> float:
+        """log of the fitted frames' likelihood, times the prior, beside a drift of these sizes [m], (3,), but for a
+        constant; beside a law of open strength too, whose whitened response is `law`, (N,)."""
+        gram, shadow = self._seen_beside(law)
+        wide = np.ones(len(shadow))
+        wide[nuisance.span(self.groups, "drift")] = nuisance.by_part(sizes / self.drift)
+        return nuisance.likelihood(gram, shadow, wide) + float(nuisance.drift_prior(sizes).sum())
+
+    def likeliest_drift(self, law: np.ndarray | None = None) -> np.ndarray:
+        """Sizes of the drift's parts [m], (3,), of largest `likelihood`."""
+        sizes = np.full(len(nuisance.PARTS), nuisance.DRIFT)
+        for _ in range(nuisance.ASCENTS):
+            for part in range(len(sizes)):
+                tries = np.tile(sizes, (len(nuisance.DRIFTS), 1))
+                tries[:, part] = nuisance.DRIFTS
+                sizes = max(tries, key=lambda tried: self.likelihood(tried, law))
+        return sizes
+
+    def _seen_beside(self, law: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+        """Products of the metric's columns, and a law's, with each other and with the residual."""
+        gram, shadow = self._products
+        if law is None:
+            return gram, shadow
+        # Its strength is as open as a direction of the metric that takes this much chi square.
+        unit = LAW / max(np.linalg.norm(law), 1e-30) * law
+        aside = self.space.seen_through(unit)
+        gram = np.block([[gram, aside[:, None]], [aside[None], np.array([[unit @ unit]])]])
+        return gram, np.append(shadow, unit @ self.z)
+
+    @cached_property
+    def _products(self) -> tuple[np.ndarray, np.ndarray]:
+        U = self.space.columns
+        return (U.T @ U).astype(float), self.space.seen_through(self.z)
+
+    def open_by(self, name: str, times: float | np.ndarray) -> "Case":
+        """The same with the prior of one kind of nuisance some times as wide, or of each of its directions, (C,)."""
         columns = self.space.columns.copy()
         columns[:, span(self.groups, name)] *= times
         groups = [g.wider(times) if g.name == name else g for g in self.groups]

@@ -12,7 +12,7 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, judgement, nuisance, verdict
 from surgisim.diagnosis.base import HELD, Base
 from surgisim.diagnosis.base_fit import fit_base, settled
-from surgisim.diagnosis.candidates import Parts, blocks, costly, finer, of_law
+from surgisim.diagnosis.candidates import Parts, blocks, costly, finer
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.context import Case, nulls, workers
 from surgisim.diagnosis.evidence import Finding, Score, Scores, by_law, highest, judge
@@ -32,8 +32,10 @@ from surgisim.recordings.recording import Recording
 Progress = Callable[[float, float, str], None]
 MOST_HELD = 4e-3
 """How far what is held may end from where its box does [m]."""
-STEADIER = 0.9
-"""Share of a drift beyond which a law that leaves it has nothing to do with it."""
+STEADIER = 1.25
+"""Times the drift that rest shows beyond which the one that all frames ask for is another."""
+MORE = 1.5
+"""Times the drift that a base was fitted beside beyond which it is fitted again."""
 FIRSTS = 2
 """Laws beside which a second one is looked for."""
 
@@ -55,7 +57,7 @@ def diagnose(
     detected = case.overstretched or max(score.evidence for score in laws.values()) > threshold(laws, settings)
     if detected:
         parts = costly(clip, case.base, memo, case.workers)
-        findings += search(case, case.z, case.nulls, lambda s, text: progress(0.64, 1, text), parts)
+        findings += searched(case, lambda s, text: progress(0.64, 1, text), parts)
         laws = by_law(findings)
     ranked, refits = sorted(laws, key=lambda term: -laws[term].evidence), []
     if detected:
@@ -124,43 +126,53 @@ def first_look(
     """Noise, base, nuisances, and all that is cheap to try. Raises Problem where the recording cannot be used."""
     clip = clip_of(recording, share=settings.grid, device=settings.device)
     progress(0.01, 1, f"noise of {len(clip.kept)} points on {clip.until} frames")
-    case = prepare_case(clip, settings, memo, progress)
+    case, at_rest = prepare_case(clip, settings, memo, progress)
 
-    def searched(case: Case) -> list[Finding]:
-        return search(case, case.z, case.nulls, lambda s, text: progress(0.25 + 0.39 * s, 1, text))
+    def looked(case: Case) -> list[Finding]:
+        return searched(case, lambda s, text: progress(0.25 + 0.39 * s, 1, text))
 
-    findings = searched(case)
-    for mend in (laid_anew, steadied):
-        mended = mend(case, by_law(findings), progress)
-        if mended is not None:
-            case, findings = mended, searched(mended)
+    findings = looked(case)
+    mended = laid_anew(case, by_law(findings), progress)
+    if mended is not None:
+        case, findings = mended, looked(mended)
+    if (case.drift > STEADIER * at_rest).any():
+        progress(0.64, 1, "a camera that drifts as little as it does at rest")
+        calm = case.drifting(np.minimum(case.drift, at_rest))
+        found = looked(calm)
+        if highest_of(by_law(found)) > highest_of(by_law(findings)):
+            case, findings = calm, found
+    steadier = steadied(case, by_law(findings), progress)
+    if steadier is not None:
+        case, findings = steadier, looked(steadier)
     return case, findings
 
 
+def highest_of(laws: Scores) -> float:
+    """log evidence of the best law."""
+    return max(score.evidence for score in laws.values())
+
+
+def searched(case: Case, progress: Callable[[float, str], None], parts: Parts | None = None) -> list[Finding]:
+    """Every hypothesis of `parts` (or of all that is cheap) against the base's residual."""
+    found = search(case, case.z, case.nulls, progress, parts)
+    return [replace(f, log_evidence=f.log_evidence - case.behind) for f in found]
+
+
 def steadied(case: Case, laws: Scores, progress: Progress) -> Case | None:
-    """The case with the drift of the camera that is most likely beside the best law; None where it stays.
+    """The case with the drift of the camera that is likeliest beside the best law; None where it stays.
 
-    A drift is learned from tissue at rest, and what breathes moves there too. So where the law takes part of the drift
-    away, both are weighed together: the likelihood of all fitted frames for the law at its best, drift by drift.
+    A drift is learned without any law, and what breathes or weighs on tissue moves the whole picture too. So the best
+    law and the drift are weighed together.
     """
-    top, clip, settings = max(laws, key=lambda term: laws[term].evidence), case.clip, case.settings
-    if laws[top].evidence < calibration.THRESHOLD or "drift" in settings.without:
+    best = max(laws, key=lambda term: laws[term].evidence)
+    if laws[best].evidence < calibration.THRESHOLD or "drift" in case.settings.without:
         return None
-    law = refit(case, laws[top].best, laws[top].evidence, case.z)
-    calm = replace(clip, moved=clip.moved - law.response * clip.seen[..., None])
-    if nuisance.drift_of(calm, case.noise, settings.offsets) > STEADIER * case.drift:
+    progress(0.64, 1, f"the camera's drift beside {best}")
+    law = refit(case, laws[best].best, laws[best].evidence, case.z)
+    if not law.response.any():
         return None
-    progress(0.64, 1, f"the camera's drift beside {top}")
-    parts = list(of_law(top, clip, case.base, case.memo))
-
-    def support(other: Case) -> float:
-        gain = max(f.gain for f in search(other, other.z, case.nulls[:, :0], lambda *_: None, parts))
-        return 0.5 * (gain - other.misfit - other.space.log_det) + float(nuisance.drift_prior(other.drift))
-
-    least = nuisance.DRIFTS[0]
-    sizes = np.geomspace(least, case.drift, 1 + round(np.log2(max(case.drift / least, 1))))[:-1]
-    best = max([case, *(case.drifting(size) for size in sizes)], key=support)
-    return None if best is case else best
+    sizes = case.likeliest_drift(case.whiten(law.response[:, : case.clip.until]))
+    return None if np.abs(np.log(sizes / case.drift)).max() < np.log(STEADIER) else case.drifting(sizes)
 
 
 def laid_anew(case: Case, laws: Scores, progress: Progress) -> Case | None:
@@ -184,10 +196,10 @@ def laid_anew(case: Case, laws: Scores, progress: Progress) -> Case | None:
     by = float(np.clip(off, -MOST_HELD, MOST_HELD))
     near = case.open_by("held", nuisance.FAR_OFF / HELD / 2)
     try:
-        moved = prepare_case(case.clip.laid(raised=by), case.settings, case.memo, progress, case.base)
+        moved, _ = prepare_case(case.clip.laid(raised=by), case.settings, case.memo, progress, case.base, case.drift)
     except (Problem, Breakdown):
         return near
-    return moved if case.misfit - moved.misfit - (by / HELD) ** 2 > least else near
+    return moved if case.misfit - moved.drifting(case.drift).misfit - (by / HELD) ** 2 > least else near
 
 
 def hazy(case: Case, laws: Scores) -> bool:
@@ -199,8 +211,16 @@ def hazy(case: Case, laws: Scores) -> bool:
     return case.overstretched and max(score.evidence for score in laws.values()) < calibration.CLEAR
 
 
-def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress, begun: Base | None = None) -> Case:
-    """Noise, base, nuisances; begun: a base of nearly the same body."""
+def prepare_case(
+    clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress, begun: Base | None = None,
+    drift: np.ndarray | None = None,
+) -> tuple[Case, np.ndarray]:  # fmt: skip
+    """Noise, base, nuisances, with the drift of the camera that is likeliest without any law; that at rest [m], (3,).
+
+    begun: a base of nearly the same body; drift: how far the camera may drift over the clip beside it [m], (3,), as at
+    rest if None. A base fitted beside much less than all fitted frames then ask for made up for the camera, and
+    is fitted again.
+    """
     until = clip.until
     fitted = slice(0, until)
     noise = estimate(
@@ -211,7 +231,8 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
             noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0
         )
     whiten = whitener(noise, clip.rest, clip.seen[:, fitted], settings.offsets)
-    drift = nuisance.drift_of(clip, noise, settings.offsets)
+    at_rest = nuisance.drift_of(clip, noise, settings.offsets)
+    drift = at_rest if drift is None else drift
 
     def beside(clip: Clip, simulated: np.ndarray, gradient: np.ndarray, error: np.ndarray) -> np.ndarray:
         return whitened(whiten, nuisance.of_base(clip, simulated, error, gradient, drift, noise, settings), until)
@@ -229,7 +250,15 @@ def prepare_case(clip: Clip, settings: Diagnosing, memo: Memo, progress: Progres
     clip, base = settled(clip, fine, whiten, space, slopes, base, memo)
     z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
     drawn = nulls(space, whiten, settings)
-    return Case(clip, settings, noise, whiten, base, space, memo, z, drawn, slopes, groups, drift)
+    case = Case(clip, settings, noise, whiten, base, space, memo, z, drawn, slopes, groups, drift)
+    if "drift" in settings.without:
+        return case, at_rest
+    likeliest = case.likeliest_drift()
+    if begun is None and (likeliest > MORE * drift).any():
+        progress(0.2, 1, f"the base beside a camera that drifts by {1e3 * likeliest.max():.2g} mm")
+        again, _ = prepare_case(clip, settings, memo, progress, base, np.maximum(drift, likeliest))
+        return again, at_rest
+    return case.drifting(likeliest), at_rest
 
 
 def whitened(whiten: Whitener, groups: list[Group], until: int) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from surgisim.diagnosis import nuisance
 from surgisim.diagnosis.saturated import smooth_part
 
 LEAST = 3
@@ -28,6 +29,20 @@ def _mean(left: np.ndarray, seen: np.ndarray, span: slice) -> tuple[np.ndarray, 
     """Of every point over the frames in `span` in which it is seen, (K, 3), and how many those are, (K,)."""
     count = seen[:, span].sum(1)
     return left[:, span].sum(1) / np.maximum(count, 1)[:, None], count
+
+
+def steadied(case, simulated: np.ndarray) -> np.ndarray:
+    """A prediction with the drift of the camera that is likeliest beside it, over all frames [m], (K, T, 3)."""
+    mine = nuisance.span(case.groups, "drift")
+    if mine.start == mine.stop:
+        return simulated
+    columns = next(g.columns for g in case.groups if g.name == "drift")
+    left, ahead = case.clip.moved - simulated, case.prospect
+    if ahead is None:
+        likely = case.space.likely(case.whiten(left[:, : case.clip.until]))
+    else:
+        likely = ahead.space_all.likely(ahead.whiten_all(left))
+    return simulated + np.tensordot(likely[mine], columns, 1)
 
 
 def rms(case, simulated) -> tuple[float, float | None]:

@@ -14,7 +14,7 @@ from scipy.special import expit
 from surgisim.diagnosis import calibration, candidates
 from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.context import Case
-from surgisim.diagnosis.errors import bootstrap, noise_floor, residual, rms
+from surgisim.diagnosis.errors import bootstrap, noise_floor, residual, rms, steadied
 from surgisim.diagnosis.evidence import Scores
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint, least, prediction
@@ -230,8 +230,8 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
 
 
 def _unfit(case: Case, fitted: Joint, noise: Noise) -> bool:
-    """Whether frames held out are farther off than a recording is beside what it holds."""
-    left = rms(case, fitted.moved)[1]
+    """Whether frames held out are farther off than a recording is beside what it holds, the camera's drift aside."""
+    left = rms(case, steadied(case, fitted.moved))[1]
     return left is not None and left > calibration.UNFIT * noise_floor(noise.sigma)
 
 
@@ -347,9 +347,10 @@ def noise_beside(case: Case, after: np.ndarray) -> Noise:
 
 
 def taken(case: Case, after: np.ndarray, sigma: float) -> float:
-    """Share of the misfit's mean square beyond the noise that a prediction takes away on fitted frames."""
+    """Share of the misfit's mean square beyond noise and the camera's drift that a prediction takes away on fitted
+    frames."""
     floor = 3e6 * sigma**2
-    before, left = (rms(case, s)[0] ** 2 - floor for s in (case.base.simulated, after))
+    before, left = (rms(case, steadied(case, s))[0] ** 2 - floor for s in (case.base.simulated, after))
     return float(np.clip(1 - left / before, 0, 1)) if before > 0 else 0.0
 
 

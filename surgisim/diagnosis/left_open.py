@@ -30,10 +30,10 @@ def nuisances(case: Case) -> list[dict[str, Any]]:
         at += len(group.columns)
     drift = drifted(case)
     if drift is not None:
-        share = shares["drift"]
+        sd = shares["drift"] * float(np.linalg.norm(case.drift))
         result.append(
-            {"name": "camera drift by the end", "value": drift, "sd": share * case.drift, "unit": "m",
-             "said": share < TOLD}
+            {"name": "camera drift by the end", "value": drift, "sd": sd, "unit": "m",
+             "said": shares["drift"] < TOLD}
         )  # fmt: skip
     fitted = {entry["name"]: entry for entry in result}
     for j, last in case.clip.releases():

@@ -9,6 +9,7 @@ who grip, glue, film and track are taken to be able to do.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis.base import HELD, Base, by_held, displacement_gradient, tracks_of
@@ -29,10 +30,16 @@ SCALE = 0.03
 """Of the scale along each axis [1]: a focal length or a depth is known to some per cent."""
 DRIFT, DRIFT_SPREAD = 1.5e-4, 1.0
 """Median and spread (logarithm) of how far a camera drifts over a clip [m], before its rest has been looked at."""
-DRIFTS = np.geomspace(2e-5, 1.5e-3, 14)
+DRIFTS = np.geomspace(2e-5, 3e-3, 16)
 """Sizes that are weighed [m]."""
-WALKS = 3
-"""Courses of a drift: the first of a random walk's (Karhunen and Loeve); the last goes to and fro 1.25 times."""
+WALKS = 16
+"""Courses of a drift: the first of a random walk's (Karhunen and Loeve), which leave 1 % of its mean square. A camera
+does not only glide: with three courses one that walks by .2 to .6 mm was taken for a weight that sets in."""
+PARTS = (1, 2, 1)
+"""Patterns over the tissue of a drift's parts, each of a size of its own: all of the picture, its gradients, and what
+is bilinear."""
+ASCENTS = 3
+"""How often each part's size is weighed beside the others'."""
 LEAST_REST = 6
 """Frames of rest from which a drift is learned."""
 PLACE, SLIGHT, MOST_PLACES = 1.0, 1.0, 150
@@ -72,24 +79,28 @@ class Group:
     values: tuple[tuple[str, float, str], ...] = ()
     """Name, prior standard deviation and unit of each direction that a reader would ask for, in order."""
 
-    def wider(self, times: float) -> "Group":
-        return Group(self.name, times * self.columns, tuple((name, times * sd, unit) for name, sd, unit in self.values))
+    def wider(self, times: float | np.ndarray) -> "Group":
+        """All directions some times as wide, or each, (C,)."""
+        each = np.broadcast_to(times, len(self.columns))
+        named = tuple((name, float(t) * sd, unit) for (name, sd, unit), t in zip(self.values, each, strict=False))
+        return Group(self.name, each[:, None, None, None] * self.columns, named)
 
 
 def of_base(
-    clip: Clip, simulated: np.ndarray, error: np.ndarray, gradient: np.ndarray, drift: float, noise: Noise,
+    clip: Clip, simulated: np.ndarray, error: np.ndarray, gradient: np.ndarray, drift: np.ndarray, noise: Noise,
     settings: Diagnosing,
 ) -> list[Group]:  # fmt: skip
     """What a base is fitted with.
 
-    error: what a finer grid changes [m], (K, T, 3); gradient: displacement's [1], (3, K, T, 3); drift: its size [m].
+    error: what a finer grid changes [m], (K, T, 3); gradient: displacement's [1], (3, K, T, 3); drift: sizes of its
+    parts [m], (3,).
     """
     groups = [*camera(clip, simulated), drifting(clip, drift), places(clip, gradient, noise)]
     return chosen([*groups, simulator(clip, error, settings.model_error)], settings)
 
 
 def of_laws(
-    clip: Clip, base: Base, drift: float, noise: Noise, memo: Memo, settings: Diagnosing, workers: int
+    clip: Clip, base: Base, drift: np.ndarray, noise: Noise, memo: Memo, settings: Diagnosing, workers: int
 ) -> list[Group]:
     """What laws are fitted with: the same, and grips, held tissue and elastic laws that may be others."""
     near, moved = base.tangent, HELD * by_held(clip, base.x, base.simulated, memo)
@@ -157,8 +168,8 @@ def places(clip: Clip, gradient: np.ndarray, noise: Noise) -> Group:
     return Group("place", columns)
 
 
-def drifting(clip: Clip, size: float, frames: int | None = None) -> Group:
-    """Slow motions of the camera, bilinear over the tissue, by about `size` [m] until the end."""
+def drifting(clip: Clip, sizes: np.ndarray, frames: int | None = None) -> Group:
+    """Slow motions of the camera, whose parts (PARTS) move the picture by about `sizes` [m], (3,), until the end."""
     frames = frames or clip.frames
     flat = (clip.rest - clip.rest.mean(0)) @ plane(clip).T
     u, v = (flat / np.maximum(np.sqrt((flat**2).mean(0)), 1e-9)).T
@@ -166,34 +177,53 @@ def drifting(clip: Clip, size: float, frames: int | None = None) -> Group:
     k = np.arange(1, WALKS + 1)[:, None] - 0.5
     time = np.arange(frames) / max(clip.frames - 1, 1)
     courses = np.sqrt(2) * np.sin(k * np.pi * time) / (k * np.pi)
-    field = np.einsum("pk,ct->pckt", patterns, courses).reshape(-1, len(clip.rest), frames)
-    return Group("drift", size * np.concatenate([field[..., None] * e for e in np.eye(3)]))
+    field = np.einsum("pk,ct,ai->packti", patterns, courses, np.eye(3)).reshape(-1, len(clip.rest), frames, 3)
+    return Group("drift", field).wider(by_part(sizes))
+
+
+def by_part(sizes: np.ndarray) -> np.ndarray:
+    """What holds for each part of a drift, (3,), for each of its directions, (C,)."""
+    return np.repeat(sizes, [3 * WALKS * patterns for patterns in PARTS])
 
 
 def drift_prior(size: np.ndarray) -> np.ndarray:
-    """log density of how far a camera drifts over a clip [m], but for a constant."""
+    """log density of how far one part of a drift goes over a clip [m], but for a constant."""
     return -0.5 * (np.log(size / DRIFT) / DRIFT_SPREAD) ** 2
 
 
-def drift_of(clip: Clip, noise: Noise, offsets: bool) -> float:
-    """How far the camera drifts over a clip [m], from the rest before the first grasp: RMS of the posterior."""
-    log_prior = drift_prior(DRIFTS)
+def drift_of(clip: Clip, noise: Noise, offsets: bool) -> np.ndarray:
+    """How far the camera drifts over a clip [m], (3,), from the rest before the first grasp: RMS of the posterior.
+
+    What tissue does once it is gripped says more of it (`Case.likeliest_drift`), but may be what a law does.
+    """
     busy = clip.motion.active.any(0) if len(clip.motion.active) else np.ones(clip.frames, bool)
     rest = min(int(busy.argmax()) if busy.any() else clip.frames, clip.until)
+    sizes = np.full(len(PARTS), DRIFT)
+    gram, shadow = np.zeros((2, 0, 0))
     if rest >= LEAST_REST:
         seen = clip.seen[:, :rest]
         mine = seen.any(1)
         whiten = whitener(replace(noise, level=noise.level[mine]), clip.rest[mine], seen[mine], offsets)
         z = whiten(clip.moved[mine, :rest])
-        U = whiten(drifting(clip, 1.0, rest).columns[:, mine]).T
+        U = whiten(drifting(clip, np.ones(len(PARTS)), rest).columns[:, mine]).T
         gram, shadow = U.T @ U, U.T @ z
-        values, vectors = np.linalg.eigh(gram)
-        values, turned = np.maximum(values, 0), (vectors.T @ shadow) ** 2
-        for n, size in enumerate(DRIFTS):
-            grown = 1 + size**2 * values
-            log_prior[n] += 0.5 * (size**2 * turned / grown).sum() - 0.5 * np.log(grown).sum()
-    weight = np.exp(log_prior - log_prior.max())
-    return float(np.sqrt((weight * DRIFTS**2).sum() / weight.sum()))
+    for _ in range(ASCENTS):
+        for part in range(len(PARTS)):
+            log = np.zeros(len(DRIFTS))
+            for n, size in enumerate(DRIFTS):
+                sizes[part] = size
+                log[n] = drift_prior(size) + (likelihood(gram, shadow, by_part(sizes)) if rest >= LEAST_REST else 0.0)
+            weight = np.exp(log - log.max())
+            sizes[part] = np.sqrt((weight * DRIFTS**2).sum() / weight.sum())
+    return sizes
+
+
+def likelihood(gram: np.ndarray, shadow: np.ndarray, wide: np.ndarray) -> float:
+    """log likelihood of a whitened residual z beside directions U, each of prior standard deviation `wide`, (M,), but
+    for what does not depend on it. gram: U^T U, (M, M); shadow: U^T z, (M,)."""
+    factor = np.linalg.cholesky(np.eye(len(wide)) + wide[:, None] * gram * wide)
+    half = solve_triangular(factor, wide * shadow, lower=True)
+    return float(0.5 * (half**2).sum() - np.log(np.diag(factor)).sum())
 
 
 def simulator(clip: Clip, error: np.ndarray, share: float = 1.0) -> Group:

@@ -30,7 +30,9 @@ def laid(monkeypatch, evidence: float, alone: float, beside: float, better: floa
         return 1e-3 * (beside if len(likely) > case.space.columns.shape[1] else alone)
 
     def again(clip, *_):
-        return SimpleNamespace(clip=clip, misfit=case.misfit - better)
+        moved = SimpleNamespace(clip=clip, misfit=case.misfit - better)
+        moved.drifting = lambda size: moved
+        return moved, case.drift
 
     monkeypatch.setattr(diagnose, "refit", lambda *_: law)
     monkeypatch.setattr(nuisance, "likely_held", told)
