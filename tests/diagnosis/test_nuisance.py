@@ -142,6 +142,7 @@ def test_a_stiffness_that_is_hardly_told_is_said_with_where_it_may_lie(case):
 
 
 def test_a_camera_that_drifts_is_said(case):
+    case = case.drifting(np.full(3, nuisance.DRIFT))
     assert not any("camera drifts" in said for said in told(case))
     until = case.clip.until
     drift = next(g for g in case.groups if g.name == "drift")
@@ -207,14 +208,15 @@ def test_laws_owe_what_the_base_loses_where_the_camera_may_drift_less(case):
     noise = case.noise.draw(case.clip.rest, case.clip.frames, rng)
     walked = replace(case, z=case.whiten((walk + noise)[:, :until]))
     # Ratios are those of the covariance as it is built anew for each size.
-    small, large = (walked.drifting(np.array([size, 1e-4, 1e-4])) for size in (1e-4, 8e-4))
+    likeliest = walked.likeliest_drift()
+    small, large = (walked.drifting(likeliest * [times, 1, 1]) for times in (0.1, 1.5))
     plain = [-0.5 * (c.misfit + c.space.log_det) + nuisance.drift_prior(c.drift).sum() for c in (small, large)]
     assert small.behind - large.behind == pytest.approx(plain[1] - plain[0], rel=1e-2)
-    assert walked.drifting(walked.likeliest_drift()).behind == 0.0
-    assert large.behind < 8.0 < 30.0 < small.behind
+    assert walked.drifting(likeliest).behind == 0.0
+    assert large.behind < 5.0 < 30.0 < small.behind
     # A law that moves tissue like the camera leaves little for the camera.
     law = case.whiten(np.broadcast_to(walk, case.clip.moved.shape)[:, :until])
-    assert walked.likeliest_drift(law)[0] < 0.5 * walked.likeliest_drift()[0]
+    assert walked.likeliest_drift(law)[0] < 0.5 * likeliest[0]
 
 
 def test_the_log_determinant_of_a_metric_is_that_of_its_covariance():
