@@ -165,7 +165,7 @@ def steadied(case: Case, laws: Scores, progress: Progress) -> Case | None:
     law and the drift are weighed together.
     """
     best = max(laws, key=lambda term: laws[term].evidence)
-    if laws[best].evidence < calibration.THRESHOLD or "drift" in case.settings.without:
+    if laws[best].evidence < calibration.TRIED or "drift" in case.settings.without:
         return None
     progress(0.64, 1, f"the camera's drift beside {best}")
     law = refit(case, laws[best].best, laws[best].evidence, case.z)
@@ -256,7 +256,7 @@ def prepare_case(
     likeliest = case.likeliest_drift()
     if begun is None and (likeliest > MORE * drift).any():
         progress(0.2, 1, f"the base beside a camera that drifts by {1e3 * likeliest.max():.2g} mm")
-        again, _ = prepare_case(clip, settings, memo, progress, base, np.maximum(drift, likeliest))
+        again, _ = prepare_case(clip.less(None), settings, memo, progress, base, np.maximum(drift, likeliest))
         return again, at_rest
     return case.drifting(likeliest), at_rest
 

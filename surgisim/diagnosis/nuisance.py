@@ -192,7 +192,7 @@ def drift_prior(size: np.ndarray) -> np.ndarray:
 
 
 def drift_of(clip: Clip, noise: Noise, offsets: bool) -> np.ndarray:
-    """How far the camera drifts over a clip [m], (3,), from the rest before the first grasp: RMS of the posterior.
+    """How far the camera drifts over a clip [m], (3,), from the rest before the first grasp: the posterior's median.
 
     What tissue does once it is gripped says more of it (`Case.likeliest_drift`), but may be what a law does.
     """
@@ -214,7 +214,7 @@ def drift_of(clip: Clip, noise: Noise, offsets: bool) -> np.ndarray:
                 sizes[part] = size
                 log[n] = drift_prior(size) + (likelihood(gram, shadow, by_part(sizes)) if rest >= LEAST_REST else 0.0)
             weight = np.exp(log - log.max())
-            sizes[part] = np.sqrt((weight * DRIFTS**2).sum() / weight.sum())
+            sizes[part] = np.exp((weight * np.log(DRIFTS)).sum() / weight.sum())
     return sizes
 
 

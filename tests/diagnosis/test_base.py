@@ -167,7 +167,8 @@ def test_a_release_taken_to_fall_elsewhere_gives_another_body_that_fits_worse(le
 
 def test_tissue_of_a_finer_grid_is_not_taken_for_a_stiffer_one():
     made = recording(fps=QUICK, sigma=4e-5, share=FINER * GRID)
-    case, coarse = case_of(made), case_of(made, without=["simulator"])
+    # A camera that may drift would make up for a part of it.
+    case, coarse = case_of(made, without=["drift"]), case_of(made, without=["drift", "simulator"])
     assert coarse.clip.error is None
     assert coarse.base.x[0] - TRUE[0] > 0.1
     assert abs(case.base.x[0] - TRUE[0]) < 0.5 * (coarse.base.x[0] - TRUE[0])
