@@ -1,10 +1,8 @@
 """What points do under a rhythm of contraction: every period and phase as a mix of few columns.
 
-A part of tissue pulls as max(0, sin x)^2, x = 2 pi t / period + phase - k . X, up to its second harmonic
-
-    w(x) = 1/4 + 4 / (3 pi) sin x - 1/4 cos 2 x
-
-so that all phases of a period are mixes of 1, sin x, cos x, sin 2 x and cos 2 x at phase zero.
+A part of tissue pulls as w(x) = sin(x / 2 d)^2 while 0 < x < 2 pi d, else not, x = 2 pi t / period + phase - k . X up to
+whole turns, d the duty: for d = 1/2 it rests for half of every period, for d = 1 it never does. Up to its second harmonic
+w is a mix of 1, sin x, cos x, sin 2 x and cos 2 x, and so are all its phases.
 """
 
 from collections.abc import Sequence
@@ -14,7 +12,6 @@ import numpy as np
 from surgisim.diagnosis.hypothesis import SETS_IN, ease
 from surgisim.diagnosis.look import Look
 
-MEAN, ONE, TWO = 0.25, 4 / (3 * np.pi), -0.25
 PARTS = 4
 """Columns a period, beside the one of the mean."""
 
@@ -44,13 +41,24 @@ def columns(look: Look, states: np.ndarray, periods: Sequence[float], start: flo
     return np.stack(found).swapaxes(1, 2)
 
 
-def mix(periods: Sequence[float], which: int, phase: float) -> np.ndarray:
-    """A wave of one period and phase [rad] by those columns, (1 + PARTS len(periods),)."""
+def mix(periods: Sequence[float], which: int, phase: float, duty: float = 0.5) -> np.ndarray:
+    """A wave of one period, phase [rad] and duty by those columns, (1 + PARTS len(periods),)."""
     found = np.zeros(1 + PARTS * len(periods))
-    found[0] = MEAN
+    found[0] = duty / 2
     at = 1 + PARTS * which
     # Columns are sin x, cos x, sin 2 x, cos 2 x without the phase.
-    found[at : at + PARTS] = [
-        ONE * np.cos(phase), ONE * np.sin(phase), -TWO * np.sin(2 * phase), TWO * np.cos(2 * phase),
-    ]  # fmt: skip
+    for n in (1, 2):
+        part = 2 * harmonic(duty, n) * np.exp(1j * n * phase)
+        found[at + 2 * n - 2 : at + 2 * n] = -part.imag, part.real
     return found
+
+
+def harmonic(duty: float, n: int) -> complex:
+    """c_n of w(x) = sum c_n exp(i n x)."""
+
+    def whole(rate: float) -> complex:
+        """Integral of exp(i rate x) over a pull."""
+        end = 2 * np.pi * duty
+        return end if abs(rate) < 1e-9 else (np.exp(1j * rate * end) - 1) / (1j * rate)
+
+    return (whole(-n) - 0.5 * (whole(1 / duty - n) + whole(-1 / duty - n))) / (4 * np.pi)

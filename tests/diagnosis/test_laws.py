@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from planted import GRID, recording
 
+from surgisim.diagnosis import waves
 from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.inclusion import SPHERE, stiffness_of
@@ -25,7 +26,7 @@ def test_a_lump_answers_as_a_sphere_does(s):
 
 @pytest.mark.parametrize("start", [0.0, 0.9])
 def test_waves_keep_their_phase_and_start_from_rest(clip, start):
-    about = {"period": 1.2, "wavelength": 0.04, "axis": np.array([0.8, 0.6, 0.0]), "phase": 2.0}
+    about = {"period": 1.2, "duty": 0.5, "wavelength": 0.04, "axis": np.array([0.8, 0.6, 0.0]), "phase": 2.0}
     h = Hypothesis("active_contraction", np.ones((1, 1)), 1, None, start, None, about)
     numbers = law_of(h, np.array([200.0]), clip).values["active_contraction"]
     rest = clip.body.rest.astype(float)
@@ -37,6 +38,19 @@ def test_waves_keep_their_phase_and_start_from_rest(clip, start):
     soon = start + 0.3
     turns = turns + 2 * np.pi * (soon - late) / 1.2
     assert np.allclose(twin_wave(soon, onset, 1.2, 0.5, begin), np.maximum(np.sin(turns), 0) ** 2, atol=0.03)
+
+
+@pytest.mark.parametrize("duty", [0.35, 0.5, 1.0])
+def test_a_phase_of_a_contraction_is_a_mix_of_its_first_two_harmonics(duty):
+    time, period, phase = np.arange(4000) / 1000, 0.8, 0.9
+    course = twin_wave(time, -phase / (2 * np.pi) * period, period, duty, -9.0)
+    x = 2 * np.pi * time / period
+    harmonics = np.stack([np.ones_like(x), np.sin(x), np.cos(x), np.sin(2 * x), np.cos(2 * x)])
+    mine = waves.mix([1.25, period], 1, phase, duty)
+    assert mine[1:5] == pytest.approx(0.0)
+    assert mine[[0, 5, 6, 7, 8]] == pytest.approx(np.linalg.lstsq(harmonics.T, course, rcond=None)[0], abs=2e-3)
+    # What never rests has one harmonic alone.
+    assert np.abs(course - mine[[0, 5, 6, 7, 8]] @ harmonics).max() < (1e-6 if duty == 1.0 else 0.2)
 
 
 def test_a_push_keeps_its_direction(clip):

@@ -30,6 +30,10 @@ TURNS_STANDING = 4
 """Directions of a pull that stands, over half a turn."""
 PERIODS = (0.8, 1.0, 1.25, 1.6, 2.0)
 """[s]"""
+DUTIES = (0.5, 1.0)
+"""Share of a period in which tissue pulls: it rests for half of it, or swells and sinks without a rest."""
+MAY_LAST = 0.2
+"""How far that may be off (logarithm)."""
 WAVES, WAVES_HERE = (0.024, 0.045), (0.035,)
 """Wavelengths tried everywhere and in a layer [m], for a body of 36 mm; they follow the body's size."""
 PHASES = tuple(np.arange(6) * 2 * np.pi / 6)
@@ -49,7 +53,13 @@ def law(h, amplitude, clip) -> Law:
     onset = -h.about["phase"] / (2 * np.pi) * period
     along = clip.body.rest.astype(float) @ np.asarray(h.about["axis"], float)
     onset -= period * math.ceil((onset + slowness * (along.max() - along.mean())) / period)
-    rhythm = {"onset": onset, "period": period, "duty": 0.5, "slowness": slowness, "begin": h.onset + SETS_IN / 2}
+    rhythm = {
+        "onset": onset,
+        "period": period,
+        "duty": h.about["duty"],
+        "slowness": slowness,
+        "begin": h.onset + SETS_IN / 2,
+    }
     return Law({NAME: {"tension": float(amplitude[0]), **rhythm, "yaw": yaw, "pitch": pitch}}, placed(h, NAME))
 
 
@@ -76,13 +86,17 @@ def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:
     periods, phases = b["period"] * np.exp(0.18 * near), b["phase"] + near * np.pi / 3
     if np.isinf(b["wavelength"]):
         turns = b["turn"] + near * np.pi / TURNS_STANDING
-        yield from _standing(look, [here(h)], turns, periods, phases, starts)
-        yield from _standing(look, around(look, h, step), [b["turn"]], [b["period"]], phases, [b["start"]])
+        yield from _standing(look, [here(h)], turns, periods, phases, starts, (b["duty"],))
+        yield from _standing(
+            look, around(look, h, step), [b["turn"]], [b["period"]], phases, [b["start"]], (b["duty"],)
+        )
         return
     for turn in b["turn"] + near * 2 * np.pi / TURNS:
-        yield _travelling(look, here(h), turn, b["wavelength"] * np.exp(0.5 * near), periods, phases, starts)
+        lengths = b["wavelength"] * np.exp(0.5 * near)
+        yield _travelling(look, here(h), turn, lengths, periods, phases, starts, (b["duty"],))
     for where in around(look, h, step):
-        yield _travelling(look, where, b["turn"], [b["wavelength"]], [b["period"]], phases, [b["start"]])
+        lengths, starts = [b["wavelength"]], [b["start"]]
+        yield _travelling(look, where, b["turn"], lengths, [b["period"]], phases, starts, (b["duty"],))
 
 
 def _axis(look: Look, turn: float) -> np.ndarray:
@@ -97,7 +111,7 @@ def _pulled(look: Look, axis: np.ndarray, shares: np.ndarray) -> np.ndarray:
 
 
 def _travelling(
-    look: Look, where: Where, turn: float, lengths: Sequence[float], periods, phases, starts=(0.0,)
+    look: Look, where: Where, turn: float, lengths: Sequence[float], periods, phases, starts=(0.0,), duties=DUTIES
 ) -> Block:
     axis, weight = _axis(look, turn), where.weight(look.rest)
     columns, forms = [], []
@@ -109,11 +123,13 @@ def _travelling(
     found = []
     for k, form in enumerate(forms):
         mine = np.eye(len(forms))[k]
-        found += _hypotheses(where, form, periods, phases, lambda mix, mine=mine: np.kron(mine, mix))
+        found += _hypotheses(where, form, periods, phases, duties, lambda mix, mine=mine: np.kron(mine, mix))
     return Block(np.concatenate(columns), found)
 
 
-def _standing(look: Look, wheres: Sequence[Where], turns, periods, phases, starts=(0.0,)) -> Iterator[Block]:
+def _standing(
+    look: Look, wheres: Sequence[Where], turns, periods, phases, starts=(0.0,), duties=DUTIES
+) -> Iterator[Block]:
     if not len(wheres):
         return
     shares = np.stack([w.weight(look.rest) for w in wheres])
@@ -123,7 +139,7 @@ def _standing(look: Look, wheres: Sequence[Where], turns, periods, phases, start
         found = []
         for turn in turns:
             form, threads = (_axis(look, turn), STANDS, turn, start), _threads(turn)
-            found += _hypotheses(where, form, periods, phases, lambda mix, by=threads: np.kron(by, mix))
+            found += _hypotheses(where, form, periods, phases, duties, lambda mix, by=threads: np.kron(by, mix))
         yield Block(columns, found)
 
 
@@ -134,11 +150,14 @@ def _threads(turn: float) -> np.ndarray:
     return np.linalg.solve(np.stack([c * c, c * s, s * s]), [a * a, a * b, b * b])
 
 
-def _hypotheses(where: Where, form: tuple, periods, phases, mixed) -> Iterator[Hypothesis]:
+def _hypotheses(where: Where, form: tuple, periods, phases, duties, mixed) -> Iterator[Hypothesis]:
     axis, length, turn, start = form
-    for (n, period), phase in itertools.product(enumerate(periods), phases):
-        about = {"period": period, "wavelength": length, "axis": axis, "phase": phase, "turn": turn, "start": start}
-        mix = mixed(waves.mix(periods, n, phase))[:, None]
+    for (n, period), phase, duty in itertools.product(enumerate(periods), phases, duties):
+        about = {
+            "period": period, "duty": duty, "wavelength": length, "axis": axis, "phase": phase, "turn": turn,
+            "start": start,
+        }  # fmt: skip
+        mix = mixed(waves.mix(periods, n, phase, duty))[:, None]
         yield Hypothesis(NAME, mix, 1, where.place, start, None, about, where.scope)
 
 
@@ -151,7 +170,8 @@ def _slower(h: Hypothesis, amplitude: np.ndarray, by: float, clip: Clip) -> knob
 
 def turned(h: Hypothesis, amplitude: np.ndarray) -> list[knobs.Knob]:
     travels = [] if np.isinf(h.about["wavelength"]) else [knobs.logarithm("wavelength", 0.4)]
-    rhythm = [knobs.Knob(_slower), *travels, knobs.turn("axis"), knobs.plus("phase", MAY_TURN)]
+    lasts = knobs.logarithm("duty", MAY_LAST, 1.0)
+    rhythm = [knobs.Knob(_slower), lasts, *travels, knobs.turn("axis"), knobs.plus("phase", MAY_TURN)]
     return [*knobs.strength(h, amplitude), *knobs.place(h), *knobs.moment(h, "onset"), *rhythm]
 
 
