@@ -1,8 +1,8 @@
 """What points do under a rhythm of contraction: every period and phase as a mix of few columns.
 
-A part of tissue pulls as w(x) = sin(x / 2 d)^2 while 0 < x < 2 pi d, else not, x = 2 pi t / period + phase - k . X up to
-whole turns, d the duty: for d = 1/2 it rests for half of every period, for d = 1 it never does. Up to its second harmonic
-w is a mix of 1, sin x, cos x, sin 2 x and cos 2 x, and so are all its phases.
+A part of tissue pulls as w(x) = sin(x / 2 d)^2 while 0 < x < 2 pi d, else not, x = 2 pi t / period + phase - k . X up
+to whole turns, d the duty: for d = 1/2 it rests for half of every period, for d = 1 it never does. Up to its second
+harmonic w is a mix of 1, sin x, cos x, sin 2 x and cos 2 x, and so are all its phases.
 """
 
 from collections.abc import Sequence
