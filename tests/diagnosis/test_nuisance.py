@@ -169,7 +169,7 @@ def test_what_a_case_draws_is_like_its_recording(case):
     assert np.mean(ahead) == pytest.approx(1.0, abs=0.1)
 
 
-@pytest.mark.parametrize(("evidence", "steadier"), [(90.0, True), (5.0, False)])
+@pytest.mark.parametrize(("evidence", "steadier"), [(90.0, True), (4.0, False)])
 def test_a_drift_and_a_law_that_moves_the_whole_picture_are_weighed_together(monkeypatch, evidence, steadier):
     case = plain().drifting(np.full(3, 2e-3))
     finding = Finding(
