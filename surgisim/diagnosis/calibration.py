@@ -30,7 +30,8 @@ where points sit was a nuisance."""
 MISFIT = 0.05
 """Share of the explained chi square that signatures of the right law leave wrong."""
 UNFIT = 2.0
-"""Times the noise by which frames held out may be off beside what is named: on the opened boards 22112611 and 22112612
+"""Times the noise by which frames held out may be off beside what is named, the camera's drift aside, which was not
+taken off when this was read: on the opened boards 22112611 and 22112612
 single laws that are there leave 1.1 to 1.5, one of two laws 1.1 to 1.6, a push in place of two others 2.2, one in place
 of a swelling 2.7."""
 EXPLAINED = 0.55

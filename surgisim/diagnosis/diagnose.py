@@ -9,7 +9,7 @@ from surgisim.artifacts.diagnosis import Diagnosis
 from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis import calibration, judgement, nuisance, verdict
+from surgisim.diagnosis import calibration, evidence, judgement, nuisance, verdict
 from surgisim.diagnosis.base import HELD, Base
 from surgisim.diagnosis.base_fit import fit_base, settled
 from surgisim.diagnosis.candidates import Parts, blocks, costly, finer
@@ -33,9 +33,9 @@ Progress = Callable[[float, float, str], None]
 MOST_HELD = 4e-3
 """How far what is held may end from where its box does [m]."""
 STEADIER = 1.25
-"""Times the drift that rest shows beyond which the one that all frames ask for is another."""
+"""Times the drift that rest shows beyond which the one that all frames ask for is another; chosen."""
 MORE = 1.5
-"""Times the drift that a base was fitted beside beyond which it is fitted again."""
+"""Times the drift that a base was fitted beside beyond which it is fitted again; chosen."""
 FIRSTS = 2
 """Laws beside which a second one is looked for."""
 
@@ -54,7 +54,7 @@ def diagnose(
         case, findings = first_look(recording, finer, memo.on(finer.grid), again)
     clip, settings, memo = case.clip, case.settings, case.memo
     laws = by_law(findings)
-    detected = case.overstretched or max(score.evidence for score in laws.values()) > threshold(laws, settings)
+    detected = case.overstretched or evidence.best(laws) > threshold(laws, settings)
     if detected:
         parts = costly(clip, case.base, memo, case.workers)
         findings += searched(case, lambda s, text: progress(0.64, 1, text), parts)
@@ -139,17 +139,12 @@ def first_look(
         progress(0.64, 1, "a camera that drifts as little as it does at rest")
         calm = case.drifting(np.minimum(case.drift, at_rest))
         found = looked(calm)
-        if highest_of(by_law(found)) > highest_of(by_law(findings)):
+        if evidence.best(by_law(found)) > evidence.best(by_law(findings)):
             case, findings = calm, found
     steadier = steadied(case, by_law(findings), progress)
     if steadier is not None:
         case, findings = steadier, looked(steadier)
     return case, findings
-
-
-def highest_of(laws: Scores) -> float:
-    """log evidence of the best law."""
-    return max(score.evidence for score in laws.values())
 
 
 def searched(case: Case, progress: Callable[[float, str], None], parts: Parts | None = None) -> list[Finding]:
@@ -208,7 +203,7 @@ def hazy(case: Case, laws: Scores) -> bool:
     What is hidden close to a grip, where tissue tears, is steeper than a coarse grid can show: there nothing fits well,
     and how firmly the grip carries makes up for it.
     """
-    return case.overstretched and max(score.evidence for score in laws.values()) < calibration.CLEAR
+    return case.overstretched and evidence.best(laws) < calibration.CLEAR
 
 
 def prepare_case(

@@ -31,7 +31,7 @@ def _mean(left: np.ndarray, seen: np.ndarray, span: slice) -> tuple[np.ndarray, 
     return left[:, span].sum(1) / np.maximum(count, 1)[:, None], count
 
 
-def steadied(case, simulated: np.ndarray) -> np.ndarray:
+def with_drift(case, simulated: np.ndarray) -> np.ndarray:
     """A prediction with the drift of the camera that is likeliest beside it, over all frames [m], (K, T, 3)."""
     mine = nuisance.span(case.groups, "drift")
     if mine.start == mine.stop:

@@ -113,6 +113,11 @@ def by_law(findings: list[Finding]) -> Scores:
     return result
 
 
+def best(laws: Scores) -> float:
+    """log evidence of the best law."""
+    return max(score.evidence for score in laws.values())
+
+
 def highest(laws: Scores) -> np.ndarray:
     """log evidence of the best law on each residual of nothing, (D,)."""
     return np.max([score.nulls for score in laws.values()], 0)

@@ -14,8 +14,8 @@ from scipy.special import expit
 from surgisim.diagnosis import calibration, candidates
 from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.context import Case
-from surgisim.diagnosis.errors import bootstrap, noise_floor, residual, rms, steadied
-from surgisim.diagnosis.evidence import Scores
+from surgisim.diagnosis.errors import bootstrap, noise_floor, residual, rms, with_drift
+from surgisim.diagnosis.evidence import Scores, best
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint, least, prediction
 from surgisim.diagnosis.noise import Noise, estimate
@@ -231,7 +231,7 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
 
 def _unfit(case: Case, fitted: Joint, noise: Noise) -> bool:
     """Whether frames held out are farther off than a recording is beside what it holds, the camera's drift aside."""
-    left = rms(case, steadied(case, fitted.moved))[1]
+    left = rms(case, with_drift(case, fitted.moved))[1]
     return left is not None and left > calibration.UNFIT * noise_floor(noise.sigma)
 
 
@@ -270,7 +270,7 @@ def _reason(
 def nothing(case: Case, laws: Scores, took: float | None = None) -> Judgement:
     """Where no law says what noise and nuisances do not; took: what the best law takes, where it was run."""
     plain = case.base.simulated
-    top = max(score.evidence for score in laws.values())
+    top = best(laws)
     logs = {term: score.evidence / calibration.TEMPERATURE for term, score in laws.items()}
     chances = _shares(logs, max(0.0, calibration.THRESHOLD - top) / 4)
     if took is not None:
@@ -350,7 +350,7 @@ def taken(case: Case, after: np.ndarray, sigma: float) -> float:
     """Share of the misfit's mean square beyond noise and the camera's drift that a prediction takes away on fitted
     frames."""
     floor = 3e6 * sigma**2
-    before, left = (rms(case, steadied(case, s))[0] ** 2 - floor for s in (case.base.simulated, after))
+    before, left = (rms(case, with_drift(case, s))[0] ** 2 - floor for s in (case.base.simulated, after))
     return float(np.clip(1 - left / before, 0, 1)) if before > 0 else 0.0
 
 

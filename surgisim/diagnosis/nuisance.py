@@ -34,7 +34,9 @@ DRIFTS = np.geomspace(2e-5, 3e-3, 16)
 """Sizes that are weighed [m]."""
 WALKS = 16
 """Courses of a drift: the first of a random walk's (Karhunen and Loeve), which leave 1 % of its mean square. A camera
-does not only glide: with three courses one that walks by .2 to .6 mm was taken for a weight that sets in."""
+does not only glide: with three courses, walks of .6 and 1.1 mm were taken for a weight that sets in. That, and that
+PARTS have sizes of their own, was chosen after recordings of one other solver (docs/diagnosis.md, "A camera that
+walks")."""
 PARTS = (1, 2, 1)
 """Patterns over the tissue of a drift's parts, each of a size of its own: all of the picture, its gradients, and what
 is bilinear."""
@@ -192,14 +194,15 @@ def drift_prior(size: np.ndarray) -> np.ndarray:
 
 
 def drift_of(clip: Clip, noise: Noise, offsets: bool) -> np.ndarray:
-    """How far the camera drifts over a clip [m], (3,), from the rest before the first grasp: the posterior's median.
+    """How far the camera drifts over a clip [m], (3,), as the rest before the first grasp tells: geometric mean.
 
     What tissue does once it is gripped says more of it (`Case.likeliest_drift`), but may be what a law does.
     """
     busy = clip.motion.active.any(0) if len(clip.motion.active) else np.ones(clip.frames, bool)
     rest = min(int(busy.argmax()) if busy.any() else clip.frames, clip.until)
     sizes = np.full(len(PARTS), DRIFT)
-    gram, shadow = np.zeros((2, 0, 0))
+    directions = len(by_part(sizes))
+    gram, shadow = np.zeros((directions, directions)), np.zeros(directions)
     if rest >= LEAST_REST:
         seen = clip.seen[:, :rest]
         mine = seen.any(1)
@@ -212,7 +215,7 @@ def drift_of(clip: Clip, noise: Noise, offsets: bool) -> np.ndarray:
             log = np.zeros(len(DRIFTS))
             for n, size in enumerate(DRIFTS):
                 sizes[part] = size
-                log[n] = drift_prior(size) + (likelihood(gram, shadow, by_part(sizes)) if rest >= LEAST_REST else 0.0)
+                log[n] = drift_prior(size) + likelihood(gram, shadow, by_part(sizes))
             weight = np.exp(log - log.max())
             sizes[part] = np.exp((weight * np.log(DRIFTS)).sum() / weight.sum())
     return sizes

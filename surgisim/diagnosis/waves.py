@@ -41,7 +41,7 @@ def columns(look: Look, states: np.ndarray, periods: Sequence[float], start: flo
     return np.stack(found).swapaxes(1, 2)
 
 
-def mix(periods: Sequence[float], which: int, phase: float, duty: float = 0.5) -> np.ndarray:
+def mix(periods: Sequence[float], which: int, phase: float, duty: float) -> np.ndarray:
     """A wave of one period, phase [rad] and duty by those columns, (1 + PARTS len(periods),)."""
     found = np.zeros(1 + PARTS * len(periods))
     found[0] = duty / 2

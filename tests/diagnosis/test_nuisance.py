@@ -13,6 +13,7 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import diagnose, nuisance
 from surgisim.diagnosis.base import SPREAD, Known, carried, displacement_gradient, tracks_of
 from surgisim.diagnosis.diagnose import whitened
+from surgisim.diagnosis.errors import rms, with_drift
 from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.left_open import drifted, nuisances, told
@@ -200,6 +201,22 @@ def test_a_drift_is_learned_from_all_fitted_frames_part_by_part(case):
     assert 4e-4 < likeliest[0] < 2e-3
     assert likeliest[1:].max() < 2.5e-4
     assert replace(case, z=case.whiten(noise[:, :until])).likeliest_drift().max() < 2.5e-4
+
+
+def test_what_the_camera_did_is_no_misfit(case):
+    clip, rng = case.clip, np.random.default_rng(33)
+    steps = 1e-3 / np.sqrt(clip.frames) * rng.standard_normal((clip.frames, 3))
+    walk = np.cumsum(steps, 0)[None] * clip.seen[..., None]
+    walked = replace(case, clip=replace(clip, moved=clip.moved + walk)).drifting(np.array([1e-3, 1e-4, 1e-4]))
+    still, plain, aside = (
+        np.array(rms(*told))
+        for told in (
+            (case, case.base.simulated), (walked, case.base.simulated),
+            (walked, with_drift(walked, case.base.simulated)),
+        )
+    )  # fmt: skip
+    assert (plain > 1.3 * still).all()
+    assert aside == pytest.approx(still, rel=0.15)
 
 
 def test_laws_owe_what_the_base_loses_where_the_camera_may_drift_less(case):

@@ -95,8 +95,8 @@ def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:
         lengths = b["wavelength"] * np.exp(0.5 * near)
         yield _travelling(look, here(h), turn, lengths, periods, phases, starts, (b["duty"],))
     for where in around(look, h, step):
-        lengths, starts = [b["wavelength"]], [b["start"]]
-        yield _travelling(look, where, b["turn"], lengths, [b["period"]], phases, starts, (b["duty"],))
+        only = [b["wavelength"]], [b["period"]], phases, [b["start"]], (b["duty"],)
+        yield _travelling(look, where, b["turn"], *only)
 
 
 def _axis(look: Look, turn: float) -> np.ndarray:
