@@ -43,6 +43,8 @@ class Case:
     """What a residual may hold beside physics, over the whole clip."""
     drift: np.ndarray
     """How far the parts of the camera's drift go over the clip [m], (3,)."""
+    drift_at_rest: np.ndarray
+    """The same as the rest before the first grasp tells it [m], (3,)."""
     behind: float = 0.0
     """By how much the base alone is less likely with this drift than with the one that suits it best [log evidence].
     Every law found here owes as much: without it, the camera would have been said to drift."""

@@ -126,7 +126,7 @@ def first_look(
     """Noise, base, nuisances, and all that is cheap to try. Raises Problem where the recording cannot be used."""
     clip = clip_of(recording, share=settings.grid, device=settings.device)
     progress(0.01, 1, f"noise of {len(clip.kept)} points on {clip.until} frames")
-    case, at_rest = prepare_case(clip, settings, memo, progress)
+    case = prepare_case(clip, settings, memo, progress)
 
     def looked(case: Case) -> list[Finding]:
         return searched(case, lambda s, text: progress(0.25 + 0.39 * s, 1, text))
@@ -135,9 +135,9 @@ def first_look(
     mended = laid_anew(case, by_law(findings), progress)
     if mended is not None:
         case, findings = mended, looked(mended)
-    if (case.drift > STEADIER * at_rest).any():
+    if (case.drift > STEADIER * case.drift_at_rest).any():
         progress(0.64, 1, "a camera that drifts as little as it does at rest")
-        calm = case.drifting(np.minimum(case.drift, at_rest))
+        calm = case.drifting(np.minimum(case.drift, case.drift_at_rest))
         found = looked(calm)
         if evidence.best(by_law(found)) > evidence.best(by_law(findings)):
             case, findings = calm, found
@@ -191,7 +191,7 @@ def laid_anew(case: Case, laws: Scores, progress: Progress) -> Case | None:
     by = float(np.clip(off, -MOST_HELD, MOST_HELD))
     near = case.open_by("held", nuisance.FAR_OFF / HELD / 2)
     try:
-        moved, _ = prepare_case(case.clip.laid(raised=by), case.settings, case.memo, progress, case.base, case.drift)
+        moved = prepare_case(case.clip.laid(raised=by), case.settings, case.memo, progress, case.base, case.drift)
     except (Problem, Breakdown):
         return near
     return moved if case.misfit - moved.drifting(case.drift).misfit - (by / HELD) ** 2 > least else near
@@ -209,8 +209,8 @@ def hazy(case: Case, laws: Scores) -> bool:
 def prepare_case(
     clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress, begun: Base | None = None,
     drift: np.ndarray | None = None,
-) -> tuple[Case, np.ndarray]:  # fmt: skip
-    """Noise, base, nuisances, with the drift of the camera that is likeliest without any law; that at rest [m], (3,).
+) -> Case:  # fmt: skip
+    """Noise, base, nuisances, with the drift of the camera that is likeliest without any law.
 
     begun: a base of nearly the same body; drift: how far the camera may drift over the clip beside it [m], (3,), as at
     rest if None. A base fitted beside much less than all fitted frames then ask for made up for the camera, and
@@ -245,15 +245,14 @@ def prepare_case(
     clip, base = settled(clip, fine, whiten, space, slopes, base, memo)
     z = whiten(clip.moved[:, fitted] - base.simulated[:, fitted])
     drawn = nulls(space, whiten, settings)
-    case = Case(clip, settings, noise, whiten, base, space, memo, z, drawn, slopes, groups, drift)
+    case = Case(clip, settings, noise, whiten, base, space, memo, z, drawn, slopes, groups, drift, at_rest)
     if "drift" in settings.without:
-        return case, at_rest
+        return case
     likeliest = case.likeliest_drift()
     if begun is None and (likeliest > MORE * drift).any():
         progress(0.2, 1, f"the base beside a camera that drifts by {1e3 * likeliest.max():.2g} mm")
-        again, _ = prepare_case(clip.less(None), settings, memo, progress, base, np.maximum(drift, likeliest))
-        return again, at_rest
-    return case.drifting(likeliest), at_rest
+        return prepare_case(clip.less(None), settings, memo, progress, base, np.maximum(drift, likeliest))
+    return case.drifting(likeliest)
 
 
 def whitened(whiten: Whitener, groups: list[Group], until: int) -> np.ndarray:

@@ -84,7 +84,7 @@ def memo_of(made: Recording) -> Memo:
 def case_of(made: Recording, **settings) -> Case:
     """Noise, base and nuisances of a recording."""
     chosen = Diagnosing(**{"grid": GRID, "nulls": 8, **settings})
-    return prepare_case(clip_of(made, share=chosen.grid), chosen, memo_of(made), lambda *_: None)[0]
+    return prepare_case(clip_of(made, share=chosen.grid), chosen, memo_of(made), lambda *_: None)
 
 
 @cache
