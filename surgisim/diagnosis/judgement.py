@@ -164,13 +164,15 @@ def judged(
     explained = float(np.clip(fitted.gain / total, 0, 1))
     noise = noise_beside(case, fitted.moved)
     took = taken(case, fitted.moved, noise.sigma)
-    reason = _reason(case, chosen, chances[term], explained, took, _unfit(case, fitted, noise), over)
+    others = instead(chosen, tried, chances)
+    held = chances[term] + sum(chances[r.term] for r in others)
+    reason = _reason(case, chosen, held, explained, took, _unfit(case, fitted, noise), over)
     if worse and reason == "named":
         reason = "refuted"
     if reason == "faint":
         return nothing(case, laws, took)
     verdict = "named" if reason == "named" else "unexplained"
-    others = instead(chosen, tried, chances) if verdict == "named" else ()
+    others = others if verdict == "named" else ()
     if others:
         verdict = "equivalence class"
     if verdict == "unexplained":
@@ -236,9 +238,9 @@ def _unfit(case: Case, fitted: Joint, noise: Noise) -> bool:
 
 
 def _reason(
-    case: Case, chosen: Explanation, chance: float, explained: float, took: float, unfit: bool, over: Gain | None
+    case: Case, chosen: Explanation, held: float, explained: float, took: float, unfit: bool, over: Gain | None
 ) -> str:
-    """Why it is named, or not; chance: its probability among all laws."""
+    """Why it is named, or not; held: its probability among all laws, with those that it may be instead."""
     free = not case.settings.calibrated
     clear = free or chosen.log_evidence >= calibration.CLEAR
     seen = free or took >= calibration.TAKEN
@@ -259,7 +261,7 @@ def _reason(
         return doubt if certain else "faint"
     if chosen.visible and not chosen.confirmed:
         return "unconfirmed"
-    if not chosen.visible and not clear and chance < calibration.SURE:
+    if not chosen.visible and not clear and held < calibration.SURE:
         # The fitted frames alone speak, and not for it alone.
         return "unconfirmed"
     if over is not None and over.refuted:

@@ -33,8 +33,8 @@ def explanation(term="gravity", evidence=90.0, ahead=BETTER, left=0.05, out=None
     return Explanation(Joint([one], np.zeros((1, 1, 3)), 100.0, np.zeros(3)), evidence, ahead, left, out)
 
 
-def reason(chosen: Explanation, chance=0.9, explained=0.9, took=0.9, unfit=False, over=None, case=CASE) -> str:
-    return judgement._reason(case, chosen, chance, explained, took, unfit, over)
+def reason(chosen: Explanation, held=0.9, explained=0.9, took=0.9, unfit=False, over=None, case=CASE) -> str:
+    return judgement._reason(case, chosen, held, explained, took, unfit, over)
 
 
 def test_what_frames_held_out_refute_gives_way_to_the_next_that_they_confirm():
@@ -84,9 +84,9 @@ def test_a_law_is_named_for_a_reason(chosen, said):
 @pytest.mark.parametrize("ahead", [BLIND, None])
 def test_what_nothing_confirms_and_the_fitted_frames_do_not_settle_is_supported_only(ahead):
     faint = explanation(ahead=ahead, evidence=CLEAR - 1)
-    assert reason(faint, chance=0.4) == "unconfirmed"
-    assert reason(faint, chance=0.9) == "named"
-    assert reason(explanation(ahead=ahead, evidence=CLEAR + 1), chance=0.4) == "named"
+    assert reason(faint, held=0.6) == "unconfirmed"
+    assert reason(faint, held=0.9) == "named"
+    assert reason(explanation(ahead=ahead, evidence=CLEAR + 1), held=0.6) == "named"
 
 
 @pytest.mark.parametrize(

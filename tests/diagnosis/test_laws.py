@@ -5,6 +5,7 @@ import pytest
 from planted import GRID, recording
 
 from surgisim.diagnosis import waves
+from surgisim.diagnosis.candidates import respiration
 from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.inclusion import SPHERE, stiffness_of
@@ -87,3 +88,21 @@ def test_breath_with_a_larger_second_harmonic_is_one_twice_as_fast(clip, second,
     waves = breath["amplitude"] * np.array([np.sin(breath["phase"]), np.cos(breath["phase"])])
     along = np.sign(np.sin(breath["yaw"])) or 1.0
     assert along * waves == pytest.approx([second * -6e-4, second * 8e-4] if times == 2 else [8e-4, 6e-4])
+
+
+@pytest.mark.parametrize("harmonics", [1, 2])
+def test_a_breath_of_one_harmonic_or_two_may_come_sooner(clip, harmonics):
+    h = Hypothesis("respiration", np.eye(6 * harmonics), 0, None, None, None, {"rate": 0.4})
+    parts = np.outer([6e-4, 8e-4, 1e-4, -2e-4][: 2 * harmonics], [0.0, 0.6, 0.8])
+
+    def waves(h, parts) -> np.ndarray:
+        """Both harmonics' sizes and phases, upwards."""
+        told = law_of(h, parts, clip).values["respiration"]
+        up = told["amplitude"] * np.sign(np.sin(told["pitch"]))
+        return up * np.exp(1j * np.array([told["phase"], told["second_phase"]])) * [1.0, told["second"]]
+
+    plain = waves(h, parts.ravel())
+    assert np.abs(plain) == pytest.approx([1e-3, 0.0 if harmonics == 1 else 0.5e-4 * np.hypot(1, 2)])
+    _, _, phase, *_ = respiration.turned(h, parts.ravel())
+    sooner = waves(*phase.turn(h, parts.ravel(), 1.0, clip))
+    assert sooner == pytest.approx(plain * np.exp(1j * respiration.MAY_TURN * np.array([1, 2])))

@@ -1,7 +1,7 @@
-"""The held base moves to and fro, as with breathing: two harmonics along any direction."""
+"""The held base moves to and fro, as with breathing: one harmonic or two along any direction."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from surgisim.diagnosis.uncertain import scaled
 
 NAME = "respiration"
 FASTEST, SLOWEST = 0.75, 0.18
-"""Rates that are tried [1/s]."""
+"""Rates that are tried with two harmonics [1/s]; with one, up to twice the first."""
 SOME = 0.7
 """Least share of a period that the fitted frames must hold."""
 SETS_IN = 0.5
@@ -27,17 +27,17 @@ MAY_HURRY, MAY_TURN = 0.15, 0.5
 
 
 def law(h, amplitude, clip) -> Law:
-    return Law({NAME: _breath(amplitude.reshape(4, 3), h.about["rate"])}, {})
+    return Law({NAME: _breath(amplitude.reshape(-1, 3), h.about["rate"])}, {})
 
 
 def _breath(parts: np.ndarray, rate: float) -> dict[str, float]:
-    """From sine and cosine of two harmonics along three axes, (4, 3), to one direction.
+    """From sine and cosine of one or two harmonics along three axes, (2, 3) or (4, 3), to one direction.
 
     What has a larger second harmonic than its first breathes twice as fast, without one.
     """
-    scaled_parts = parts * np.array([1.0, 1.0, 0.5, 0.5])[:, None]
+    scaled_parts = parts * np.array([1.0, 1.0, 0.5, 0.5])[: len(parts), None]
     left, size, right = np.linalg.svd(scaled_parts, full_matrices=False)
-    s, c, s2, c2 = left[:, 0] * size[0]
+    s, c, s2, c2 = np.pad(left[:, 0] * size[0], (0, 4 - len(parts)))
     if math.hypot(s2, c2) > math.hypot(s, c):
         s, c, s2, c2, rate = s2, c2, 0.0, 0.0, 2 * rate
     first, second = math.hypot(s, c), math.hypot(s2, c2)
@@ -48,42 +48,44 @@ def _breath(parts: np.ndarray, rate: float) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _block(look: Look, rates: np.ndarray) -> Block:
+def _block(look: Look, rates: Mapping[int, np.ndarray]) -> Block:
+    """rates: for so many harmonics."""
     columns = look.once("base", None, lambda: pushes.of_load(look, look.base.tangent.anchored(0).T))
     at, found = knots(look.clip), []
-    for rate in rates:
-        up, turn = ease(at / SETS_IN), 2 * np.pi * rate * at
-        waves = [
-            up * np.sin(turn),
-            up * (np.cos(turn) - 1),
-            0.5 * up * np.sin(2 * turn),
-            0.5 * up * (np.cos(2 * turn) - 1),
-        ]
-        mix = np.concatenate([spread(w) for w in waves], 1)
-        found.append(Hypothesis(NAME, mix, 0, None, about={"rate": rate}))
+    up = ease(at / SETS_IN)
+    for harmonics, some in rates.items():
+        for rate in some:
+            waves = []
+            for n in range(1, harmonics + 1):
+                turn = 2 * np.pi * n * rate * at
+                waves += [up * np.sin(turn) / n, up * (np.cos(turn) - 1) / n]
+            mix = np.concatenate([spread(w) for w in waves], 1)
+            found.append(Hypothesis(NAME, mix, 0, None, about={"rate": rate}))
     return Block(columns, found)
 
 
 def tried(look: Look) -> Parts:
     if look.clip.body.held.any():
         last = knots(look.clip)[-1]
-        yield "breathing", lambda: iter([_block(look, np.geomspace(max(SLOWEST, SOME / last), FASTEST, 14))])
+        slowest = max(SLOWEST, SOME / last)
+        # A sine needs half as many numbers, and pays less for them.
+        rates = {1: np.geomspace(slowest, 2 * FASTEST, 20), 2: np.geomspace(slowest, FASTEST, 14)}
+        yield "breathing", lambda: iter([_block(look, rates)])
 
 
 def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:
     # A rate off by two parts in a hundred is out of step by the time of the frames held out.
     reach = 0.12 if step == 1 else 0.02
-    yield _block(look, h.about["rate"] * np.exp(reach * np.linspace(-1, 1, 13)))
+    harmonics = h.mix.shape[1] // 6
+    yield _block(look, {harmonics: h.about["rate"] * np.exp(reach * np.linspace(-1, 1, 13))})
 
 
 def _later(amplitude: np.ndarray, angle: float) -> np.ndarray:
-    """The same breath, its phase further by an angle [rad]; amplitude: (12,)."""
-    s, c, s2, c2 = amplitude.reshape(4, 3)
-    first, second = ((np.cos(n * angle), np.sin(n * angle)) for n in (1, 2))
-    return np.concatenate([
-        first[0] * s - first[1] * c, first[1] * s + first[0] * c,
-        second[0] * s2 - second[1] * c2, second[1] * s2 + second[0] * c2,
-    ])  # fmt: skip
+    """The same breath, its phase further by an angle [rad]; amplitude: (6,) or (12,)."""
+    parts = amplitude.reshape(-1, 2, 3)
+    turns = [[[np.cos(n * angle), -np.sin(n * angle)], [np.sin(n * angle), np.cos(n * angle)]]
+             for n in range(1, len(parts) + 1)]  # fmt: skip
+    return (np.array(turns) @ parts).ravel()
 
 
 def _faster(h: Hypothesis, amplitude: np.ndarray, by: float, clip: Clip) -> knobs.Start:
@@ -97,7 +99,7 @@ def _aside(which: int) -> knobs.Knob:
     """Along another direction, turned about one of the two axes across its own."""
 
     def turn(h, amplitude, by, clip):
-        parts = amplitude.reshape(4, 3)
+        parts = amplitude.reshape(-1, 3)
         own = np.linalg.svd(parts, full_matrices=True)[2]
         a, b = own[0], own[which]
         angle = knobs.TURN * by
