@@ -13,9 +13,9 @@ THRESHOLD = 10.0
 ones six recordings of boards 22112611 and 22112612 (opened) that conceal nothing reach -1 to 6."""
 CLEAR = 20.0
 """log evidence of the fitted frames beyond which something is hidden for certain; chosen: twice THRESHOLD."""
-TAKEN = 0.15
-"""Share of the fitted frames' misfit, in mean squares beyond the noise, that the best law must take away up to there:
-where nothing is hidden and evidence passes the threshold all the same, the best law takes 0 to .06 (seed 907)."""
+BORNE_OUT = 0.5
+"""Share of what the best law changes that the plain error of the fitted frames must bear out (judgement.borne_out);
+chosen: half of what it bears out of a law that is there."""
 OVERSTRETCHED = 1.5
 """Squares of the nuisances at their most likely values, over what nulls stay below, beyond which something is hidden
 however little any law's signature says of it: in those runs .34 to .96 where nothing is, 2.1 and 6.1 in two bodies with

@@ -82,7 +82,9 @@ class Explanation:
     @property
     def confirmed(self) -> bool:
         """By their likelihood; or by their plain error where the likelihood, which allows for a camera, agrees."""
-        return self.visible and (self.ahead.confirmed or (self.falls and self.ahead.value > 0))
+        return self.ahead is not None and (
+            self.ahead.confirmed or (self.visible and self.falls and self.ahead.value > 0)
+        )
 
     @property
     def visible(self) -> bool:
@@ -104,8 +106,8 @@ class Judgement:
     after: np.ndarray
     """Displacement of the points with what is named [m], (K, T, 3)."""
     noise: Noise
-    taken: float | None = None
-    """Share of the fitted frames' mean square beyond the noise that it takes away."""
+    borne: float | None = None
+    """What `borne_out` says of it."""
     over_placebo: Gain | None = None
     others: tuple[Refit, ...] = ()
     """Of an equivalence class, the laws that it may be instead, most probable first."""
@@ -163,21 +165,21 @@ def judged(
     total = max(explainable(case.smooth), fitted.gain, 1e-9)
     explained = float(np.clip(fitted.gain / total, 0, 1))
     noise = noise_beside(case, fitted.moved)
-    took = taken(case, fitted.moved, noise.sigma)
+    borne = borne_out(case, fitted.moved)
     others = instead(chosen, tried, chances)
     held = chances[term] + sum(chances[r.term] for r in others)
-    reason = _reason(case, chosen, held, explained, took, _unfit(case, fitted, noise), over)
+    reason = _reason(case, chosen, held, explained, borne, _unfit(case, fitted, noise), over)
     if worse and reason == "named":
         reason = "refuted"
     if reason == "faint":
-        return nothing(case, laws, took)
+        return nothing(case, laws, borne)
     verdict = "named" if reason == "named" else "unexplained"
     others = others if verdict == "named" else ()
     if others:
         verdict = "equivalence class"
     if verdict == "unexplained":
         # What explains little, or is not believed, is no more probable than that, and all other laws with it.
-        explained = min(explained, 1 - chosen.left, took)
+        explained = min(explained, 1 - chosen.left, max(borne, 0.0))
         most = float(np.clip(explained / 2, 0.0, 0.45))
         if reason == "unconfirmed":
             most = 0.45
@@ -186,7 +188,7 @@ def judged(
     # A law that is named beside another is as probable as that, not as it would be in the other's stead.
     chances |= {r.term: min(alone(r), chances[term]) for r in fitted.refits[1:]}
     after = fitted.moved if verdict != "unexplained" else case.base.simulated
-    return Judgement(verdict, reason, chosen, chances, explained, after, noise, took, over, others)
+    return Judgement(verdict, reason, chosen, chances, explained, after, noise, borne, over, others)
 
 
 def stands(tried: list[Explanation]) -> Explanation:
@@ -238,13 +240,13 @@ def _unfit(case: Case, fitted: Joint, noise: Noise) -> bool:
 
 
 def _reason(
-    case: Case, chosen: Explanation, held: float, explained: float, took: float, unfit: bool, over: Gain | None
+    case: Case, chosen: Explanation, held: float, explained: float, borne: float, unfit: bool, over: Gain | None
 ) -> str:
     """Why it is named, or not; held: its probability among all laws, with those that it may be instead."""
     free = not case.settings.calibrated
     clear = free or chosen.log_evidence >= calibration.CLEAR
-    seen = free or took >= calibration.TAKEN
-    # What takes nothing off and is contradicted by frames held out is not certain to be anything.
+    seen = free or borne >= calibration.BORNE_OUT
+    # What the plain error does not bear out and is contradicted by frames held out is not certain to be anything.
     certain = case.overstretched or (clear and (seen or chosen.support >= calibration.CLEAR))
     if not certain and not seen:
         return "faint"
@@ -261,7 +263,7 @@ def _reason(
         return doubt if certain else "faint"
     if chosen.visible and not chosen.confirmed:
         return "unconfirmed"
-    if not chosen.visible and not clear and held < calibration.SURE:
+    if not (chosen.visible or chosen.confirmed or clear) and held < calibration.SURE:
         # The fitted frames alone speak, and not for it alone.
         return "unconfirmed"
     if over is not None and over.refuted:
@@ -269,16 +271,16 @@ def _reason(
     return "named"
 
 
-def nothing(case: Case, laws: Scores, took: float | None = None) -> Judgement:
-    """Where no law says what noise and nuisances do not; took: what the best law takes, where it was run."""
+def nothing(case: Case, laws: Scores, borne: float | None = None) -> Judgement:
+    """Where no law says what noise and nuisances do not; borne: `borne_out` of the best law, where it was run."""
     plain = case.base.simulated
     top = best(laws)
     logs = {term: score.evidence / calibration.TEMPERATURE for term, score in laws.items()}
     chances = _shares(logs, max(0.0, calibration.THRESHOLD - top) / 4)
-    if took is not None:
-        scale = min(1.0, took / 2 / max(chances.values()))
+    if borne is not None:
+        scale = min(1.0, max(borne, 0.0) / 2 / max(chances.values()))
         chances = {term: scale * chance for term, chance in chances.items()}
-    return Judgement("nothing detectable", "faint", None, chances, 0.0, plain, noise_beside(case, plain), took)
+    return Judgement("nothing detectable", "faint", None, chances, 0.0, plain, noise_beside(case, plain), borne)
 
 
 def probabilities(laws: Scores, tried: list[Explanation]) -> dict[str, float]:
@@ -348,12 +350,18 @@ def noise_beside(case: Case, after: np.ndarray) -> Noise:
     )  # fmt: skip
 
 
-def taken(case: Case, after: np.ndarray, sigma: float) -> float:
-    """Share of the misfit's mean square beyond noise and the camera's drift that a prediction takes away on fitted
-    frames."""
-    floor = 3e6 * sigma**2
-    before, left = (rms(case, with_drift(case, s))[0] ** 2 - floor for s in (case.base.simulated, after))
-    return float(np.clip(1 - left / before, 0, 1)) if before > 0 else 0.0
+def borne_out(case: Case, after: np.ndarray) -> float:
+    """How much of what a prediction changes the plain error of the fitted frames bears out, the camera's drift aside.
+
+    By how much its mean square falls, over that of the change: 1 where what is added is there (more where it is there
+    more strongly), -1 where nothing of the kind is, whatever noise and camera are taken to do in directions that they
+    hardly reach.
+    """
+    until = case.clip.until
+    both = (with_drift(case, s) for s in (case.base.simulated, after))
+    before, left = (residual(case, s, False, rest_only=False)[:, :until] for s in both)
+    change = float(((before - left) ** 2).sum())
+    return float((before**2).sum() - (left**2).sum()) / change if change > 0 else -1.0
 
 
 def reordered(refits: list[Refit], chosen: Explanation) -> list[Refit]:

@@ -42,8 +42,8 @@ class Gain:
 
     @property
     def confirmed(self) -> bool:
-        """Whether they speak for it, by more than the interval."""
-        return self.visible and self.low > 0
+        """Whether they speak for it, by more than the interval and by more than noise would."""
+        return max(self.expected, self.value) > SHOWS and self.low > 0
 
     @property
     def refuted(self) -> bool:

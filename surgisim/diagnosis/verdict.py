@@ -136,7 +136,7 @@ def worse(case: Case, shown: Replay) -> bool:
 def _shares(said_of: Judgement) -> dict:
     """Why it says so, in numbers."""
     chosen = said_of.chosen
-    told = {"reason": said_of.reason, "explained": said_of.explained, "taken": said_of.taken}
+    told = {"reason": said_of.reason, "explained": said_of.explained, "borne_out": said_of.borne}
     told["over_placebo"] = None if said_of.over_placebo is None else vars(said_of.over_placebo)
     if chosen is None:
         return told

@@ -16,6 +16,7 @@ from surgisim.diagnosis.diagnose import whitened
 from surgisim.diagnosis.errors import rms, with_drift
 from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
+from surgisim.diagnosis.judgement import borne_out
 from surgisim.diagnosis.left_open import drifted, nuisances, told
 from surgisim.diagnosis.metric import metric
 from surgisim.diagnosis.noise import whitener
@@ -217,6 +218,18 @@ def test_what_the_camera_did_is_no_misfit(case):
     )  # fmt: skip
     assert (plain > 1.3 * still).all()
     assert aside == pytest.approx(still, rel=0.15)
+
+
+def test_the_plain_error_bears_out_what_is_there_and_nothing_else(case):
+    clip, base = case.clip, case.base.simulated
+    across = clip.rest[:, 0] / np.ptp(clip.rest[:, 0])
+    course = np.clip(np.linspace(-0.5, 1.5, clip.frames), 0, 1)
+    bump = 2e-4 * np.cos(4 * np.pi * across)[:, None, None] * course[:, None] * np.array([0.0, 0.6, 0.8])
+    there = replace(case, clip=replace(clip, moved=clip.moved + bump * clip.seen[..., None]))
+    assert borne_out(there, base + bump) == pytest.approx(1.0, abs=0.4)
+    assert borne_out(there, base + 0.5 * bump) > 2.0
+    assert borne_out(case, base + bump) == pytest.approx(-1.0, abs=0.4)
+    assert borne_out(case, base) == -1.0
 
 
 def test_laws_owe_what_the_base_loses_where_the_camera_may_drift_less(case):

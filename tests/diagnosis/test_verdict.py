@@ -113,9 +113,9 @@ def test_what_shows_only_in_the_frames_held_out_is_said(bare, monkeypatch):
     assert "in those held out by 9.9 mm" in found.words
 
 
-def test_a_law_that_takes_nothing_off_the_error_is_not_named_nor_detectable_unless_it_is_clear(leaning, monkeypatch):
+def test_a_law_that_no_plain_error_bears_out_is_not_named_nor_detectable_unless_it_is_clear(leaning, monkeypatch):
     assert leaning[0].effects[0]["log_evidence"] > CLEAR
-    monkeypatch.setattr(judgement, "taken", lambda *_: 0.1)
+    monkeypatch.setattr(judgement, "borne_out", lambda *_: 0.1)
     found = verdict(values=TILT)[0]
     assert (found.verdict, found.global_test["reason"]) == ("unexplained", "little")
     monkeypatch.setattr(calibration, "CLEAR", 1e9)
