@@ -23,7 +23,7 @@ from surgisim.diagnosis.prospect import Gain
 from surgisim.diagnosis.refit import Refit, kept
 from surgisim.diagnosis.saturated import SmoothFit
 
-REASONS = ("named", "faint", "loose", "drawn", "little", "unfit", "unconfirmed", "refuted", "beaten")
+REASONS = ("named", "faint", "loose", "drawn", "little", "unbacked", "unfit", "unconfirmed", "refuted", "beaten")
 
 
 @dataclass(frozen=True)
@@ -255,8 +255,9 @@ def _reason(
     if chosen.drawn:
         return "drawn"
     # A smooth field follows what grid and mesh have wrong too: what frames held out confirm need not explain all of it.
-    much = seen and (explained >= calibration.EXPLAINED or chosen.confirmed)
-    doubts = {"refuted": chosen.refuted, "little": not much or not (free or chosen.enough), "unfit": unfit}
+    much = explained >= calibration.EXPLAINED or chosen.confirmed
+    little = not much or not (free or chosen.enough)
+    doubts = {"refuted": chosen.refuted, "unbacked": not seen, "little": little, "unfit": unfit}
     doubt = next((reason for reason, holds in doubts.items() if holds), None)
     if doubt:
         # What is not believed says that something is hidden only where that is certain.

@@ -133,7 +133,7 @@ def test_what_explains_little_says_that_something_is_hidden_only_where_that_is_c
     [
         (CLEAR + 1, BETTER, 2 * BORNE_OUT, "named"),
         (CLEAR - 1, BETTER, 2 * BORNE_OUT, "named"),
-        (CLEAR + 1, BETTER, 0.5 * BORNE_OUT, "little"),
+        (CLEAR + 1, BETTER, 0.5 * BORNE_OUT, "unbacked"),
         (CLEAR + 1, ALIKE, 2 * BORNE_OUT, "little"),
         (CLEAR - 1, ALIKE, 2 * BORNE_OUT, "faint"),
     ],
@@ -171,7 +171,7 @@ def test_of_two_laws_that_do_the_same_the_simpler_comes_first(monkeypatch, more,
 def test_a_law_is_not_named_for_little():
     assert reason(explanation(ahead=ALIKE), explained=0.5) == "little"
     assert reason(explanation(evidence=CLEAR - 1), borne=0.5 * BORNE_OUT) == "faint"
-    assert reason(explanation(evidence=CLEAR + 1), borne=0.5 * BORNE_OUT) == "little"
+    assert reason(explanation(evidence=CLEAR + 1), borne=0.5 * BORNE_OUT) == "unbacked"
     assert reason(explanation(evidence=CLEAR - 1), borne=0.5 * BORNE_OUT, case=UNCALIBRATED) == "named"
 
 

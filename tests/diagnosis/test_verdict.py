@@ -117,7 +117,7 @@ def test_a_law_that_no_plain_error_bears_out_is_not_named_nor_detectable_unless_
     assert leaning[0].effects[0]["log_evidence"] > CLEAR
     monkeypatch.setattr(judgement, "borne_out", lambda *_: 0.1)
     found = verdict(values=TILT)[0]
-    assert (found.verdict, found.global_test["reason"]) == ("unexplained", "little")
+    assert (found.verdict, found.global_test["reason"]) == ("unexplained", "unbacked")
     monkeypatch.setattr(calibration, "CLEAR", 1e9)
     found, physics, _ = verdict(values=TILT)
     assert found.verdict == "nothing detectable"
