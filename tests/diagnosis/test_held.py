@@ -32,7 +32,7 @@ def laid(monkeypatch, evidence: float, alone: float, beside: float, better: floa
     def again(clip, *_):
         moved = SimpleNamespace(clip=clip, misfit=case.misfit - better)
         moved.drifting = lambda size: moved
-        return moved, case.drift
+        return moved
 
     monkeypatch.setattr(diagnose, "refit", lambda *_: law)
     monkeypatch.setattr(nuisance, "likely_held", told)
