@@ -1,7 +1,8 @@
 """Find the tissue's physical parameters from its motion.
 
 reads   body.npz, scene.ply, tracks.npz, motion.npz, frames.npz, masks.npz, camera.json
-writes  material.npz (per particle), physics.json (laws, numbers, grid), fit.json (history, identifiability)
+writes  material.npz (per particle), physics.json (laws, numbers, grid), fit.json (history, identifiability),
+        motion.npz (the grips as fitted)
 """
 
 from surgisim.artifacts.body import Body
@@ -28,7 +29,7 @@ from surgisim.stage import stage
         "masks": Masks,
         "camera": Camera,
     },
-    writes={"material": Material, "physics": Physics, "fit": Fit},
+    writes={"material": Material, "physics": Physics, "fit": Fit, "carried": Motion},
     settings=Estimation,
 )
 def main(body, scene, tracks, motion, frames, masks, camera, *, settings, progress):

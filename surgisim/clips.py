@@ -27,6 +27,11 @@ class Clip:
     """The keys of config.yaml that this clip changes, nested."""
 
 
+def invented(changes: dict[str, dict[str, Any]]) -> dict[str, Clip]:
+    """Embedded clips by their names, each with the keys of config.yaml that it changes."""
+    return {name: Clip(name, None, overrides) for name, overrides in changes.items()}
+
+
 def read_clips(table: Path) -> dict[str, Clip]:
     """Every row by its name. Paths in the table are relative to the table's folder."""
     if not table.is_file():

@@ -34,11 +34,15 @@ class Plan:
     """The config itself, for work on what is no clip."""
 
 
-def plan(config: Mapping[str, Any], *, clips: Path, variants: Path) -> Plan:
-    """Read both tables, merge and check everything. What a variant changes wins over the clip, the clip over config."""
+def plan(config: Mapping[str, Any], *, clips: Path | Mapping[str, Clip], variants: Path) -> Plan:
+    """Merge and check everything. What a variant changes wins over the clip, the clip over config.
+
+    clips: their table, or the clips themselves.
+    """
     choices = parse(Whole, dict(config), "config")
     run = choices.run
-    rows = read_clips(clips)
+    table = clips if isinstance(clips, Path) else Path()
+    rows = read_clips(clips) if isinstance(clips, Path) else dict(clips)
     overrides = read_variants(variants)
     unknown = [v for v in run if v not in overrides]
     if unknown:
@@ -50,13 +54,13 @@ def plan(config: Mapping[str, Any], *, clips: Path, variants: Path) -> Plan:
         parse(Whole, merged(config, changes), f"{variants}: variant '{variant}'")
     slices, homes, known = {}, {}, {}
     for name, clip in rows.items():
-        own = merged(config, rooted(clip.overrides, clips.resolve().parent))
+        own = merged(config, rooted(clip.overrides, table.resolve().parent))
         first: dict[tuple[str, str], str] = {}
         for variant, changes in overrides.items():
             raw = merged(own, changes)
             key = json.dumps(raw, sort_keys=True, default=str)
             if key not in known:
-                known[key] = _slices(parse(Whole, raw, f"{clips}: clip '{name}'"))
+                known[key] = _slices(parse(Whole, raw, f"{table}: clip '{name}'"))
             reach: dict[str, str] = {}
             for stage, shared in known[key].items():
                 mine = shared if stage not in OWN else _named(shared, clip=name, variant=variant)

@@ -23,15 +23,19 @@ class Motion(Artifact):
     confidence: np.ndarray
     """How sure we are that this is a grasp, 0-1, (J,)."""
     source: Literal["found", "given", "none"]
+    late: np.ndarray | None = None
+    """How many frames after its last active one each grip opens, before it where negative, (J,); 0 if None [frames]."""
 
-    UNITS = {"center_rest": "m", "radius": "m", "position": "m", "confidence": "1"}
+    UNITS = {"center_rest": "m", "radius": "m", "position": "m", "confidence": "1", "late": "frames"}
 
     def __post_init__(self) -> None:
         j = self.center_rest.shape[0]
+        if self.late is None:
+            object.__setattr__(self, "late", np.zeros(j))
         t = self.active.shape[-1]
-        shapes = [self.center_rest.shape, self.radius.shape, self.position.shape, self.active.shape]
+        shapes = [self.center_rest.shape, self.radius.shape, self.position.shape, self.active.shape, self.late.shape]
         check(
-            shapes == [(j, 3), (j,), (j, t, 3), (j, t)],
-            f"Motion: shapes {shapes} do not fit; (J, 3), (J,), (J, T, 3), (J, T) are wanted.",
+            shapes == [(j, 3), (j,), (j, t, 3), (j, t), (j,)],
+            f"Motion: shapes {shapes} do not fit; (J, 3), (J,), (J, T, 3), (J, T), (J,) are wanted.",
         )
         check(bool(np.all(np.isfinite(self.position))), "Motion: position must be finite.")

@@ -16,6 +16,7 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
+from surgisim.estimation.carrying import carrying
 from surgisim.estimation.damping import numerical_damping
 from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
@@ -46,8 +47,8 @@ def estimate(
     camera: Camera,
     settings: Estimation,
     progress: Say,
-) -> tuple[Material, Physics, Fit]:
-    """Material, physics and fit of one clip.
+) -> tuple[Material, Physics, Fit, Motion]:
+    """Material, physics and fit of one clip, and how its instruments carry the tissue, as fitted.
 
     Without a grip, or without motion, nothing drives the body and nothing can be learned: the
     parameters stay at their start values, and the fit says so.
@@ -76,8 +77,12 @@ def estimate(
     ]  # fmt: skip
     reason = _nothing_to_learn(motion, tracks, body)
     if reason:
-        return _unfitted(bodies[0], wanted, settings, camera, reason)
-    observation = observe(tracks, motion, bodies[0].simulator, floor=0.02 * body.spacing)
+        return *_unfitted(bodies[0], wanted, settings, camera, reason), motion
+    observation = observe(tracks, motion, camera, bodies[0].simulator, floor=0.02 * body.spacing)
+    if settings.enabled and settings.carrying:
+        measured = bool((observation.weight[..., 2] > 0).any())
+        wanted = replace(wanted, carrying=carrying(motion, tracks, camera, measured))
+        motion = wanted.motion(wanted.start, motion)
     total = len(frames.rgb)
     fitted = fitted_frames(frames.split)
     held_out = np.setdiff1d(np.arange(1, total), fitted)
@@ -87,12 +92,14 @@ def estimate(
     support, x, history, table = choices[0], wanted.start, [], {}
     if settings.enabled:
         trial, _ = settle_grip(trial, history)
-        support = choose_support(trial, choices, phase, history, progress) if settings.support else support
+        if settings.support:
+            support, x = choose_support(trial, choices, phase, history, progress)
         trial = replace(trial, held=support.held)
     trial, default = settle_grip(trial, history)
     if settings.enabled and wanted.free:
-        trial, solution = search_softly(trial, phase, settings, history, progress)
+        trial, solution = search_softly(trial, phase, settings, history, progress, x)
         x = solution.x
+        trial = replace(trial, motion=wanted.motion(x, trial.motion))
         phase_of = np.broadcast_to(phase[fitted][None, :, None], (len(observation.rest), len(fitted), 3)).ravel()
         table = identifiability(
             solution, wanted, phase_of=phase_of, phase_names=PHASES, density=settings.density, length=support.depth,
@@ -141,7 +148,7 @@ def estimate(
     )
     names = np.array(columns(choose(bodies[0].terms)))
     material = Material(names, theta.astype(np.float32), support.held)
-    return material, _physics(bodies[0], values, table, settings, path.step, trial.grip), fit
+    return material, _physics(bodies[0], values, table, settings, path.step, trial.grip), fit, trial.motion
 
 
 def _nothing_to_learn(motion: Motion, tracks: Tracks, body: Body) -> str:

@@ -6,6 +6,8 @@ from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import Support
 
+OPEN_TOLD = 0.5
+"""The same of what is open beside the laws, whose priors are narrow."""
 TOLD = 0.1
 """A number counts as told by the clip when its posterior spread is at most this share of the prior's: a modulus to
 about 25 % either way (90 %), Poisson's ratio to about .02."""
@@ -35,7 +37,7 @@ def identifiability(
     information = independent / scale * (J.T @ J)
     covariance = np.linalg.inv(information + np.diag(1 / spread**2)) + (0.0 if model is None else model)
     result = {}
-    for name, direction, value, unit, logarithmic in _quantities(search, solution.x, density, length):
+    for name, direction, value, unit, logarithmic, size in _quantities(search, solution.x, density, length):
         sd = float(np.sqrt(direction @ covariance @ direction))
         prior = float(np.sqrt(((direction * spread) ** 2).sum()))
         by_phase = {n: float(((J[phase_of == k] @ direction) ** 2).sum()) for k, n in enumerate(phase_names)}
@@ -44,12 +46,12 @@ def identifiability(
             (value * np.exp(-1.645 * sd), value * np.exp(1.645 * sd))
             if logarithmic
             else (
-                value - 1.645 * sd,
-                value + 1.645 * sd,
+                value - 1.645 * sd * size,
+                value + 1.645 * sd * size,
             )
         )
         edge = _at_edge(search, solution.x, direction)
-        told = sd <= TOLD * prior and not edge
+        told = sd <= (OPEN_TOLD if name in {u.name for u in search.open} else TOLD) * prior and not edge
         result[name] = {
             "value": float(value),
             "low": float(low),
@@ -70,19 +72,28 @@ def _at_edge(search: Search, x: np.ndarray, direction: np.ndarray) -> bool:
 
 
 def _quantities(search: Search, x: np.ndarray, density: float, length: float):
-    """Name, gradient in search space, value, unit, whether logarithmic."""
+    """Name, gradient in search space, value, unit, whether logarithmic, and what 1 in search space is of the unit."""
     values = search.values(x)
     place = {name: k for k, name in enumerate(search.names)}
     for k, (law, param, p) in enumerate(search.free):
-        yield f"{law}.{param}", np.eye(len(x))[k], values[law][param], p.unit, p.logarithmic
+        yield f"{law}.{param}", np.eye(len(x))[k], values[law][param], p.unit, p.logarithmic, 1.0
+    for k, u in enumerate(search.open, len(search.free)):
+        yield (
+            u.name,
+            np.eye(len(x))[k],
+            u.size * (np.exp(x[k]) if u.logarithmic else x[k]),
+            u.unit,
+            u.logarithmic,
+            u.size,
+        )
     moduli = [n for n in search.names if n.endswith(".E")]
     viscosities = [n for n in search.names if n.endswith(".eta")]
     for m in moduli:
         E = values[m.split(".")[0]]["E"]
         for v in viscosities:
             eta = values[v.split(".")[0]]["eta"]
-            yield f"{v} / {m}", np.eye(len(x))[place[v]] - np.eye(len(x))[place[m]], eta / E, "s", True
-        yield f"{m} / (density length^2)", np.eye(len(x))[place[m]], E / (density * length**2), "1/s^2", True
+            yield f"{v} / {m}", np.eye(len(x))[place[v]] - np.eye(len(x))[place[m]], eta / E, "s", True, 1.0
+        yield f"{m} / (density length^2)", np.eye(len(x))[place[m]], E / (density * length**2), "1/s^2", True, 1.0
 
 
 def in_words(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.frames import USED
 from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
@@ -12,11 +13,13 @@ from surgisim.mpm.simulator import Simulator
 from surgisim.problem import Problem
 
 PHASES = ("rest", "load", "hold", "release")
+MEASURED = 0.05
+"""Depth's change counts where its standard deviation is below this share of the depth: a guess is no observation."""
 
 
 @dataclass(frozen=True)
 class Observation:
-    """Displacements of K surface points, camera frame."""
+    """Displacements of K surface points in space."""
 
     rest: np.ndarray
     """Their positions in frame 0 [m], (K, 3)."""
@@ -29,8 +32,23 @@ class Observation:
 
     def residual(self, u: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Weighted difference, simulated minus seen, at `frames`, (K, len(frames), 3); u is (T, A, 3)."""
-        simulated = np.stack([self.carry @ u[t].astype(float) for t in frames], 1)
-        return self.weight[:, frames] * (simulated - self.displacement[:, frames])
+        return self.weight[:, frames] * self.apart(self._simulated(u, frames), frames)
+
+    def pulled_back(self, bar: np.ndarray, u: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """The derivative by u, (T, A, 3), from that by `residual`, (K, len(frames), 3)."""
+        moved = self.apart_back(self.weight[:, frames] * bar, self._simulated(u, frames))
+        u_bar = np.zeros(u.shape)
+        for n, t in enumerate(frames):
+            u_bar[t] = self.carry.T @ moved[:, n]
+        return u_bar
+
+    def apart(self, moved: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """Simulated displacements, (K, len(frames), 3), minus the seen ones [m]."""
+        return moved - self.displacement[:, frames]
+
+    def apart_back(self, bar: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        """The derivative by `moved` from that by what `apart` gives, (K, len(frames), 3)."""
+        return bar
 
     @property
     def moving(self) -> np.ndarray:
@@ -39,20 +57,46 @@ class Observation:
         Where the tissue stays still every simulation is right, and a median over the whole surface
         cannot tell a good one from a bad one.
         """
-        farthest = np.linalg.norm(self.displacement, axis=-1).max(1)
+        farthest = np.linalg.norm(self.displacement * (self.weight > 0), axis=-1).max(1)
         return farthest > 0.1 * np.percentile(farthest, 99)
 
     def error(self, u: np.ndarray, frames: np.ndarray) -> float:
         """Mean distance between simulated and seen points that move, at `frames` [m]; NaN if none is seen."""
         if not len(frames):
             return float("nan")
-        simulated = np.stack([self.carry @ u[t].astype(float) for t in frames], 1)
-        seen = self.weight[:, frames].any(-1) & self.moving[:, None]
-        distance = np.linalg.norm(simulated - self.displacement[:, frames], axis=-1)[seen]
+        used = self.weight[:, frames] > 0
+        seen = used.any(-1) & self.moving[:, None]
+        apart = self.apart(self._simulated(u, frames), frames)
+        distance = np.linalg.norm(np.where(used, apart, 0.0), axis=-1)[seen]
         return float(np.mean(distance)) if len(distance) else float("nan")
 
+    def _simulated(self, u: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """Displacements of the points [m], (K, len(frames), 3)."""
+        return np.stack([self.carry @ u[t].astype(float) for t in frames], 1)
 
-def observe(tracks: Tracks, motion: Motion, simulator: Simulator, *, floor: float) -> Observation:
+
+@dataclass(frozen=True)
+class Filmed(Observation):
+    """The same points across the view as a picture shows them, along it only where depth's change is measured."""
+
+    camera: Camera
+    pixels: np.ndarray
+    """Where they were seen [px], (K, T, 2), zero where not."""
+
+    def apart(self, moved: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """Across the view at the depth of frame 0, and along it [m], (K, len(frames), 3)."""
+        pixels = self.camera.project(self.rest[:, None] + moved)
+        across = (pixels - self.pixels[:, frames]) * self.rest[:, None, 2:] / [self.camera.fx, self.camera.fy]
+        return np.concatenate([across, moved[..., 2:] - self.displacement[:, frames, 2:]], -1)
+
+    def apart_back(self, bar: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        at = self.rest[:, None] + moved
+        nearer = self.rest[:, None, 2:] / at[..., 2:]
+        slide = nearer * (bar[..., :2] * at[..., :2]).sum(-1, keepdims=True) / at[..., 2:]
+        return np.concatenate([nearer * bar[..., :2], bar[..., 2:] - slide], -1)
+
+
+def observe(tracks: Tracks, motion: Motion, camera: Camera, simulator: Simulator, *, floor: float) -> Filmed:
     """Points that the body can carry and that are not themselves driven.
 
     floor: least standard deviation of a component [m]: no tracker is exact, and the body's own
@@ -70,13 +114,23 @@ def observe(tracks: Tracks, motion: Motion, simulator: Simulator, *, floor: floa
             f"tracks: only {int(usable.sum())} points lie on the body and outside the grip, but 10 are needed to fit "
             "its physics. Use a longer focal, a larger working size, or estimation.enabled: false."
         )
-    carry = carry[usable]
+    carry, rest = carry[usable], rest[usable]
     moved = (tracks.xyz - tracks.xyz[:, :1])[usable].astype(float)
     seen = tracks.visible[usable] & np.isfinite(moved).all(-1)
     across, along = np.moveaxis(tracks.sigma_xyz[usable].astype(float), -1, 0)
     sigma = np.sqrt(np.stack([across, across, along], -1) ** 2 + floor**2)
-    weight = np.where(seen[..., None], 1 / sigma, 0.0)
-    return Observation(rest[usable], np.where(seen[..., None], moved, 0.0), weight, carry.tocsr())
+    used = np.repeat(seen[..., None], 3, -1)
+    used[..., 2] &= along < MEASURED * rest[:, None, 2]
+    # A point's place in frame 0 is where its depth was lifted from, to rounding.
+    pixels = tracks.xy[usable] - tracks.xy[usable, :1] + camera.project(rest)[:, None]
+    return Filmed(
+        rest,
+        np.where(seen[..., None], moved, 0.0),
+        np.where(used, 1 / sigma, 0.0),
+        carry.tocsr(),
+        camera,
+        np.where(seen[..., None], pixels, 0.0),
+    )
 
 
 def phases(motion: Motion, frames: int) -> np.ndarray:

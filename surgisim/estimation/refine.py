@@ -105,8 +105,5 @@ def _track_loss(observation: Observation, u: np.ndarray, frames: np.ndarray):
     r = observation.residual(u, frames)
     count = max(1, int((observation.weight[:, frames] > 0).sum()))
     loss = misfit(r) / count
-    slope = 2 * r / np.maximum(1.0, np.abs(r) / WIDTH) * observation.weight[:, frames] / count
-    u_bar = np.zeros(u.shape)
-    for n, t in enumerate(frames):
-        u_bar[t] = observation.carry.T @ slope[:, n]
-    return loss, u_bar
+    slope = 2 * r / np.maximum(1.0, np.abs(r) / WIDTH) / count
+    return loss, observation.pulled_back(slope, u, frames)

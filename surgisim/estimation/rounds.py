@@ -4,6 +4,7 @@ The paper restarts from frame 0 for every k further frames, which costs O(n^2). 
 window is twice the last, so all rounds together cost at most twice the last one: O(n).
 """
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -23,6 +24,8 @@ INDEPENDENT = 0.02
 """Share of residuals counted as independent: neighbouring points and frames share their tracking error."""
 RATIOS = (0.40, 0.47)
 """Poisson's ratios at which supports are compared: both shape the spread of a load, so neither is judged alone."""
+NEARER = (0.0, -0.7, -1.4)
+"""How far the grip comes nearer there, in spreads of its prior."""
 GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
 """How firmly instruments may hold, tried in turn."""
 SETTLED = 4
@@ -52,17 +55,23 @@ def settle_grip(trial: Trial, history: list, theta=None, values=None) -> tuple[T
     )
 
 
-def choose_support(trial: Trial, choices: list[Support], phase: np.ndarray, history: list, say: Say) -> Support:
-    """The support whose pull and hold fit best; the body's own unless another is clearly better."""
+def choose_support(
+    trial: Trial, choices: list[Support], phase: np.ndarray, history: list, say: Say
+) -> tuple[Support, np.ndarray]:
+    """The support whose pull and hold fit best, and where that was; the body's own unless another is clearly better."""
     driven = trial.fitted[phase[trial.fitted] < PHASES.index("release")]
     ratios = [k for k, (_, p, _) in enumerate(trial.wanted.free) if p == "nu"]
+    nearer = [k for k, name in enumerate(trial.wanted.names) if name.endswith(".toward")]
     if len(choices) < 2 or not len(driven):
-        return choices[0]
+        return choices[0], trial.wanted.start
     last = int(driven[-1])
     points = []
-    for value in RATIOS if ratios else (None,):
+    for value, share in itertools.product(RATIOS if ratios else (None,), NEARER if nearer else (None,)):
         x = trial.wanted.start.copy()
-        x[ratios] = value
+        if ratios:
+            x[ratios] = value
+        if nearer:
+            x[nearer] = share * trial.wanted.spread[nearer]
         points.append(x)
     jobs = [(choice, x) for choice in choices for x in points]
     say(0.03, 1.0, f"comparing {len(choices)} ways the body may be held")
@@ -72,19 +81,21 @@ def choose_support(trial: Trial, choices: list[Support], phase: np.ndarray, hist
         r = replace(trial, held=choice.held).residual(x, worker, last)
         return np.inf if r is None else INDEPENDENT * misfit(r)
 
-    costs = np.array(at_once(cost, jobs)).reshape(len(choices), -1).min(1)
+    every = np.array(at_once(cost, jobs)).reshape(len(choices), -1)
+    costs = every.min(1)
     for choice, c in zip(choices, costs, strict=True):
         history.append({"round": "support", "depth": choice.depth, "rim": choice.rim, "cost": number(c)})
     best = int(np.argmin(costs))
-    return choices[best] if costs[best] < 0.95 * costs[0] else choices[0]
+    best = best if costs[best] < 0.95 * costs[0] else 0
+    return choices[best], points[int(np.argmin(every[best]))]
 
 
-def choose_start(trial: Trial, history: list, say: Say) -> np.ndarray:
-    """The best of a few starting points.
+def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np.ndarray:
+    """The best of a few starting points about `begin`.
 
     A ring-down misfits by whole periods: from a modulus a few times too high, a descent ends there.
     """
-    wanted, points = trial.wanted, trial.wanted.starts()
+    wanted, points = trial.wanted, trial.wanted.starts(begin)
     say(0.1, 1.0, f"trying {len(points)} starts")
     results = trial.together(points)
     costs = [
@@ -102,12 +113,12 @@ def choose_start(trial: Trial, history: list, say: Say) -> np.ndarray:
 
 
 def search_softly(
-    trial: Trial, phase: np.ndarray, settings: Estimation, history: list, say: Say
+    trial: Trial, phase: np.ndarray, settings: Estimation, history: list, say: Say, begin: np.ndarray | None = None
 ) -> tuple[Trial, Solution]:
     """Start and descent, with a softer grip each time the search leaves where the clip can be simulated."""
     while True:
         try:
-            return trial, descend(trial, choose_start(trial, history, say), phase, settings, history, say)
+            return trial, descend(trial, choose_start(trial, begin, history, say), phase, settings, history, say)
         except Breakdown as breakdown:
             softer = [g for g in GRIPS if g < trial.grip]
             if not softer:
@@ -163,7 +174,8 @@ def windows(fitted: np.ndarray, phase: np.ndarray, share: float) -> list[int]:
 def plain(wanted: Search, x: np.ndarray) -> dict[str, float]:
     """'law.parameter' -> value at x."""
     values = wanted.values(x)
-    return {f"{law}.{param}": values[law][param] for law, param, _ in wanted.free}
+    laws = {f"{law}.{param}": values[law][param] for law, param, _ in wanted.free}
+    return laws | {u.name: float(v) for u, v in zip(wanted.open, x[len(wanted.free) :], strict=True)}
 
 
 def number(value: float) -> float | None:

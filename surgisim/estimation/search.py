@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surgisim.artifacts.motion import Motion
+from surgisim.estimation.carrying import Carrying, Unknown
 from surgisim.mpm.setup import Values
 from surgisim.physics.catalogue import Param, choose
 from surgisim.problem import Problem
@@ -20,26 +22,35 @@ PRIOR_SHARE = 0.3
 
 @dataclass(frozen=True)
 class Search:
-    """A point x in search space: logarithms of moduli, plain ratios."""
+    """A point x in search space: the laws' numbers (logarithms of moduli, plain ratios), then what else is open."""
 
     terms: tuple[str, ...]
     free: tuple[tuple[str, str, Param], ...]
     """Law, parameter and its description, in the order of x."""
     base: Values
     """Every parameter's start value."""
+    carrying: Carrying | None = None
+    """What is open of the grips, fitted too."""
 
     @property
     def names(self) -> list[str]:
-        return [f"{law}.{param}" for law, param, _ in self.free]
+        return [f"{law}.{param}" for law, param, _ in self.free] + [u.name for u in self.open]
+
+    @property
+    def open(self) -> tuple[Unknown, ...]:
+        """Numbers beside the laws'."""
+        return self.carrying.unknowns if self.carrying else ()
 
     @property
     def start(self) -> np.ndarray:
-        return np.array([_forward(p, self.base[law][name]) for law, name, p in self.free])
+        laws = [_forward(p, self.base[law][name]) for law, name, p in self.free]
+        return np.array(laws + [u.start for u in self.open])
 
     @property
     def spread(self) -> np.ndarray:
         """Prior standard deviation of each component of x."""
-        return np.array([PRIOR_LOG if p.logarithmic else PRIOR_SHARE * (p.high - p.low) for *_, p in self.free])
+        laws = [PRIOR_LOG if p.logarithmic else PRIOR_SHARE * (p.high - p.low) for *_, p in self.free]
+        return np.array(laws + [u.spread for u in self.open])
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -49,29 +60,34 @@ class Search:
         stiffer tissue costs ten times the steps.
         """
         ends = [(_forward(p, p.low), _forward(p, p.high)) for *_, p in self.free]
-        low, high = np.array(ends).reshape(-1, 2).T
-        logarithmic = np.array([p.logarithmic for *_, p in self.free], bool)
+        low, high = np.array(ends + [(u.low, u.high) for u in self.open]).reshape(-1, 2).T
+        logarithmic = np.array([p.logarithmic for *_, p in self.free] + [False] * len(self.open), bool)
         reach = np.where(logarithmic, REACH * self.spread, np.inf)
         return np.maximum(low, self.start - reach), np.minimum(high, self.start + reach)
 
-    def starts(self) -> list[np.ndarray]:
-        """Points to try first: the start, and up to two logarithms stepped around it."""
+    def starts(self, begin: np.ndarray | None = None) -> list[np.ndarray]:
+        """Points to try first: `begin` (the start if None), and up to two logarithms stepped around it."""
         low, high = self.bounds
-        steps = [np.zeros(len(self.free))]
+        begin = self.start if begin is None else begin
+        steps = [np.zeros(len(begin))]
         logarithmic = [k for k, (*_, p) in enumerate(self.free) if p.logarithmic]
         for k, offsets in zip(logarithmic, (FIRST_STEPS, SECOND_STEPS), strict=False):
-            steps = [s + o * np.eye(len(self.free))[k] for s in steps for o in offsets]
-        return [np.clip(self.start + s, low, high) for s in steps]
+            steps = [s + o * np.eye(len(begin))[k] for s in steps for o in offsets]
+        return [np.clip(begin + s, low, high) for s in steps]
 
     def values(self, x: np.ndarray) -> Values:
         """Law -> parameter -> value at x."""
         result = {law: dict(params) for law, params in self.base.items()}
-        for (law, name, p), value in zip(self.free, x, strict=True):
+        for (law, name, p), value in zip(self.free, x[: len(self.free)], strict=True):
             result[law][name] = float(np.exp(value) if p.logarithmic else value)
         return result
 
+    def motion(self, x: np.ndarray, found: Motion) -> Motion:
+        """How the instruments carry the tissue at x: as `found` where nothing is open."""
+        return self.carrying.at(x[len(self.free) :]) if self.carrying else found
 
-def search(terms: list[str], start: Values, fixed: list[str]) -> Search:
+
+def search(terms: list[str], start: Values, fixed: list[str], carrying: Carrying | None = None) -> Search:
     """Everything the laws have, less what is fixed; refuses names that do not exist and values out of range."""
     chosen = choose(terms)
     known = {f"{law}.{p}" for law, t in chosen.items() for p in t.params}
@@ -92,7 +108,7 @@ def search(terms: list[str], start: Values, fixed: list[str]) -> Search:
             # A logarithm cannot leave an off value of zero: a law that starts silent stays so.
             if f"{law}.{name}" not in fixed and not (p.logarithmic and value <= 0):
                 free.append((law, name, p))
-    return Search(tuple(terms), tuple(free), base)
+    return Search(tuple(terms), tuple(free), base, carrying)
 
 
 def _forward(p: Param, value: float) -> float:

@@ -48,12 +48,12 @@ class Trial:
 
     def drive(
         self, values: Values, *, frames: int | None = None, safety: float = SAFETY, stiffest=None,
-        per_frame: int | None = None,
+        per_frame: int | None = None, motion: Motion | None = None,
     ) -> Drive:  # fmt: skip
-        """The clip's motion, at a step that is stable for `stiffest` (or `values`) if `per_frame` is not given."""
+        """`motion` (the clip's), at a step that is stable for `stiffest` (or `values`) if `per_frame` is not given."""
         per_frame = per_frame or self.per_frame(values, safety=safety, stiffest=stiffest)
         return self.bodies[0].drive(
-            self.motion, values, fps=self.fps, per_frame=per_frame, frames=frames or self.frames, held=self.held,
+            motion or self.motion, values, fps=self.fps, per_frame=per_frame, frames=frames or self.frames, held=self.held,
             grip=self.grip, firm=self.firm,
         )  # fmt: skip
 
@@ -65,7 +65,8 @@ class Trial:
         """Simulate at x, up to frame `last`."""
         values = self.wanted.values(x)
         body = self.bodies[worker]
-        return body.simulator.run(self.theta(values), self.drive(values), last=last)
+        drive = self.drive(values, motion=self.wanted.motion(x, self.motion))
+        return body.simulator.run(self.theta(values), drive, last=last)
 
     def residual(self, x: np.ndarray, worker: int = 0, last: int | None = None) -> np.ndarray | None:
         """Weighted misfit of the tracks on fitted frames up to `last`, flat; None where x cannot be simulated."""
@@ -84,7 +85,8 @@ class Trial:
         values = [self.wanted.values(x) for x in points]
         # One step for all: the smallest of theirs.
         most = max(self.per_frame(v) for v in values)
-        drives = [self.drive(v, per_frame=most) for v in values]
+        motions = [self.wanted.motion(x, self.motion) for x in points]
+        drives = [self.drive(v, per_frame=most, motion=m) for v, m in zip(values, motions, strict=True)]
         runs = self.batch.run([self.theta(v) for v in values], drives, last=last)
         frames = self.fitted[self.fitted <= last]
         return [

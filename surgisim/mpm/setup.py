@@ -81,7 +81,7 @@ class Prepared:
     ) -> Drive:
         """The boundary condition of `motion`; the anchors' spring follows the tissue's modulus in `values` at `places`.
 
-        late: as in `grip.drive`.
+        late: as in `grip.drive`; the motion's own if None.
 
         firm: whether the base is known to hold, as in a recording that says so. Where it is guessed, as in a video,
         one that gives way a little is the better guess: held hard at the wrong place, a release fits a modulus many
@@ -111,7 +111,7 @@ class Prepared:
             frames=frames,
             stiffness=spring,
             grip=grip,
-            late=late,
+            late=np.repeat(motion.late[:, None], motion.active.shape[-1], 1) if late is None else late,
         )
         check_speed(path.path, path.step, spacing, fps)
         # A particle that a held box cuts is held as firmly as a whole one: the box's plane is.

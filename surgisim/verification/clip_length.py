@@ -13,6 +13,7 @@ import time
 import numpy as np
 
 from surgisim.artifacts.body import Body
+from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
@@ -29,6 +30,7 @@ TITLE = "Estimation against the length of the clip"
 FPS, PERIOD, NOISE = 25.0, 20, 5e-5
 TRUE = {"corotated": {"E": 900.0, "nu": 0.38}, "newtonian": {"eta": 1.2}}
 SPACING, SIZE = 0.006, (0.036, 0.036, 0.018)
+CAMERA = Camera(64, 48, 80.0, 80.0, 31.5, 23.5, FPS, 1, "known", "given", "slab", [64, 48], [0, 0, 64, 48])
 
 
 def measure(progress, quick: bool = False) -> dict:
@@ -48,7 +50,7 @@ def fit(frames: int) -> dict:
     bodies = [prepare(body, tuple(TRUE), density=1050.0, carried=points) for _ in range(2)]
     tracks = _tracks(bodies[0], motion, points, frames)
     ledger: list[int] = []
-    observation = observe(tracks, motion, bodies[0].simulator, floor=1e-5)
+    observation = observe(tracks, motion, CAMERA, bodies[0].simulator, floor=1e-5)
     wanted = search(list(TRUE), {}, [])
     trial = _Counted(
         bodies, wanted, motion, observation, body.held, FPS, frames, np.arange(1, frames), 1.0, ledger=ledger
@@ -108,7 +110,7 @@ def _tracks(made, motion: Motion, points: np.ndarray, frames: int) -> Tracks:
     xyz[:, 1:] += np.random.default_rng(0).normal(0, NOISE, xyz[:, 1:].shape)
     shape = xyz.shape[:2]
     return Tracks(
-        np.zeros((*shape, 2), np.float32), np.ones(shape, bool), np.full(shape, 0.1, np.float32),
+        CAMERA.project(xyz).astype(np.float32), np.ones(shape, bool), np.full(shape, 0.1, np.float32),
         xyz.astype(np.float32), np.full((*shape, 2), NOISE, np.float32),
     )  # fmt: skip
 

@@ -8,11 +8,13 @@ from pathlib import Path
 ROOT = Path(workflow.basedir).parent
 sys.path.insert(0, str(ROOT))
 
+from surgisim.clips import invented
 from surgisim.config.base import parse as checked
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.config.invent import Invent
 from surgisim.config.whole import PARENTS
 from surgisim.digest import digest
+from surgisim.phantom.family import family
 from surgisim.plan import plan
 from surgisim.problem import Problem
 from surgisim.proof.known.catalogue import catalogue as known_recordings
@@ -31,6 +33,8 @@ BLIND = (
     "draws",
 )
 
+# A number of clips, `clips=40 seed=3`, asks for as many of the phantom's family instead of those of a table.
+CLIPS = config.get("clips", ROOT / "config" / "clips.tsv")
 try:
     PLAN = plan(
         {
@@ -38,7 +42,11 @@ try:
             for key, value in config.items()
             if key not in ("clips", "variants", *BLIND)
         },
-        clips=Path(config.get("clips", ROOT / "config" / "clips.tsv")),
+        clips=(
+            invented(family(int(config.get("seed", 1)), int(CLIPS)))
+            if str(CLIPS).isdigit()
+            else Path(CLIPS)
+        ),
         variants=Path(config.get("variants", ROOT / "config" / "variants.yaml")),
     )
 except Problem as problem:

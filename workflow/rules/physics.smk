@@ -14,6 +14,7 @@ rule estimation:
         material="results/{clip}/{variant}/estimation/material.npz",
         physics="results/{clip}/{variant}/estimation/physics.json",
         fit="results/{clip}/{variant}/estimation/fit.json",
+        carried="results/{clip}/{variant}/estimation/motion.npz",
     log:
         "logs/{clip}/{variant}/estimation.log",
     benchmark:
@@ -32,6 +33,7 @@ rule estimation:
         " --body {input.body} --scene {input.scene} --tracks {input.tracks} --motion {input.motion}"
         " --frames {input.frames} --masks {input.masks} --camera {input.camera}"
         " --material {output.material} --physics {output.physics} --fit {output.fit}"
+        " --carried {output.carried}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
@@ -41,7 +43,7 @@ rule simulation:
         scene=upstream("reconstruction", "scene.ply"),
         material=upstream("estimation", "material.npz"),
         physics=upstream("estimation", "physics.json"),
-        motion=upstream("tracking", "motion.npz"),
+        motion=upstream("estimation", "motion.npz"),
         camera=upstream("ingest", "camera.json"),
         frames=upstream("ingest", "frames.npz"),
     output:

@@ -54,8 +54,9 @@ def depth(
             progress=progress,
         )
         scale = "arbitrary"
+    follows = name != "near_light"
     confidence = np.where(inpainted.origin == SEEN, confidence, np.minimum(confidence, FLAT))
-    return Depth(z.astype(np.float32), confidence.astype(np.float32), scale)
+    return Depth(z.astype(np.float32), confidence.astype(np.float32), scale, follows)
 
 
 def choose(wanted: str, given_: Given) -> str:

@@ -9,7 +9,9 @@ from surgisim.perception.tracking import Paths
 from surgisim.perception.tracking.between import sample
 
 FINE, COARSE = 0.004, 0.04
-"""Standard deviation of depth's change, as a share of it, where confidence is 1 and where it is 0."""
+"""Standard deviation of depth's change, as a share of depth, where confidence is 1 and where it is 0."""
+GUESSED = 0.1
+"""The same where the change is not measured: as much as a pull may bring tissue nearer."""
 
 
 def lift(paths: Paths, depth: Depth, camera: Camera) -> Tracks:
@@ -20,7 +22,7 @@ def lift(paths: Paths, depth: Depth, camera: Camera) -> Tracks:
     trust = np.stack([sample(depth.confidence[t].astype(np.float32), at[t])[:, 0] for t in range(frames)], 1)
     xyz = np.where(paths.visible[..., None], camera.lift(paths.xy.astype(float), z), np.nan)
     across = z * paths.sigma / camera.fx
-    along = z * (FINE + (COARSE - FINE) * (1 - np.clip(trust, 0, 1)))
+    along = z * (FINE + (COARSE - FINE) * (1 - np.clip(trust, 0, 1)) if depth.follows else GUESSED)
     return Tracks(
         xy=paths.xy.astype(np.float32),
         visible=paths.visible,

@@ -1,0 +1,127 @@
+"""What a clip leaves open of how its instruments carry the tissue, as numbers that are fitted with the laws.
+
+A picture shows where held tissue goes across the view. How far it comes nearer, how large the held ball is and when
+between two frames it is let go show in how the tissue around it moves, which is what a simulation knows.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.motion import Motion
+from surgisim.artifacts.tracks import Tracks
+
+TOWARD, TOWARD_MEASURED = 0.08, 0.01
+"""Spread of how far a grip comes nearer, as a share of its distance: a pull of some 5 to 10 mm at 50 to 100 mm, and what
+is left open of it where depth is measured in every frame."""
+BESIDE = 0.02
+"""Spread of where the held ball's middle is across the view, each way, as a share of its distance."""
+ACROSS, RADIUS = 0.05, 0.15
+"""Spread of the logarithms of a path's length across the view, and of a held ball's radius."""
+RELEASE, RELEASE_SPREAD, RELEASE_ENDS = 0.5, 0.6, (-2.0, 3.0)
+"""Frames after its last active one at which a grip opens: between that frame and the next, if it was found rightly."""
+MOST = 1 / 3
+"""Share of the farthest way that a tracked point must go to say how a pull went in time."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number beside the laws, searched as it is."""
+
+    name: str
+    start: float
+    spread: float
+    """Standard deviation of its prior about `start`."""
+    low: float
+    high: float
+    unit: str
+    logarithmic: bool = False
+    """Whether it is the logarithm of a factor."""
+    size: float = 1.0
+    """What 1 is, in `unit`."""
+
+
+@dataclass(frozen=True)
+class Carrying:
+    """The grips of a clip as they may have been."""
+
+    motion: Motion
+    camera: Camera
+    share: np.ndarray
+    """Share of its way that the pull has gone, (T,)."""
+    unknowns: tuple[Unknown, ...]
+
+    def at(self, q: np.ndarray) -> Motion:
+        """The motion where the unknowns are q, (len(unknowns),)."""
+        found, value = self.motion, dict(zip((u.name for u in self.unknowns), q, strict=True))
+        position, radius, late = found.position.copy(), found.radius.copy(), found.late.copy()
+        middle = np.array(found.center_rest, float)
+        for j, center in enumerate(found.center_rest):
+            pixels = self.camera.project(position[j])
+            start = self.camera.project(center)
+            z = position[j, :, 2] + value.get(named(j, "toward"), 0.0) * center[2] * self._share(j)
+            across = np.exp(value.get(named(j, "across"), 0.0))
+            beside = center[2] * np.array([value.get(named(j, "right"), 0.0), value.get(named(j, "down"), 0.0), 0.0])
+            position[j] = self.camera.lift(start + across * (pixels - start), z) + beside
+            middle[j] = center + beside
+            radius[j] *= np.exp(value.get(named(j, "radius"), 0.0))
+            late[j] += value.get(named(j, "release"), 0.0)
+        return replace(found, center_rest=middle, position=position, radius=radius, late=late)
+
+    def _share(self, grip: int) -> np.ndarray:
+        """The share while it holds: 0 before, and as it was when it let go after, (T,)."""
+        on = np.flatnonzero(self.motion.active[grip])
+        share = self.share - self.share[on[0]]
+        return np.concatenate([np.zeros(on[0]), share[on[0] : on[-1]], np.full(len(share) - on[-1], share[on[-1]])])
+
+
+def named(grip: int, what: str) -> str:
+    """As it is called in tables."""
+    return f"grip {grip}.{what}"
+
+
+def carrying(motion: Motion, tracks: Tracks, camera: Camera, measured: bool) -> Carrying:
+    """What is open of every grip.
+
+    measured: whether depth's change is, so that the path along the view is known to a little; otherwise the one found
+    is left aside.
+    """
+    unknowns: list[Unknown] = []
+    toward = TOWARD_MEASURED if measured else TOWARD
+    for j, center in enumerate(motion.center_rest):
+        unknowns += [
+            Unknown(named(j, "toward"), 0.0, toward, -4 * toward, 4 * toward, "m", size=float(center[2])),
+            Unknown(named(j, "right"), 0.0, BESIDE, -3 * BESIDE, 3 * BESIDE, "m", size=float(center[2])),
+            Unknown(named(j, "down"), 0.0, BESIDE, -3 * BESIDE, 3 * BESIDE, "m", size=float(center[2])),
+            Unknown(named(j, "across"), 0.0, ACROSS, -4 * ACROSS, 4 * ACROSS, "1", True),
+            Unknown(named(j, "radius"), 0.0, RADIUS, -4 * RADIUS, 4 * RADIUS, "m", True, float(motion.radius[j])),
+        ]
+        if not motion.active[j, -1]:
+            unknowns.append(Unknown(named(j, "release"), RELEASE, RELEASE_SPREAD, *RELEASE_ENDS, "frames"))
+    if not measured:
+        motion = replace(motion, position=_level(motion, camera))
+    return Carrying(motion, camera, _share(tracks, motion), tuple(unknowns))
+
+
+def _level(motion: Motion, camera: Camera) -> np.ndarray:
+    """The paths as the picture shows them, at the depth of rest [m], (J, T, 3)."""
+    return camera.lift(
+        camera.project(motion.position), np.broadcast_to(motion.center_rest[:, None, 2], motion.active.shape)
+    )
+
+
+def _share(tracks: Tracks, motion: Motion) -> np.ndarray:
+    """How far the pull has gone, from what moves with it: what each frame has of the farthest one's motion, (T,)."""
+    held = motion.active.any(0)
+    moved = np.where(tracks.visible[..., None], tracks.xy - tracks.xy[:, :1], 0.0).astype(float)
+    far = np.linalg.norm(moved, axis=-1)
+    lively = far.max(1) > MOST * np.percentile(far.max(1), 99)
+    moved, seen = moved[lively], tracks.visible[lively]
+    most = int(np.argmax(np.where(held, np.median(far[lively], 0), -1.0)))
+    both = seen & seen[:, most : most + 1]
+    along = ((moved * moved[:, most : most + 1]).sum(-1) * both).sum(0)
+    share = along / np.maximum((far[lively, most : most + 1] ** 2 * both).sum(0), 1e-12)
+    share[held] = gaussian_filter1d(share[held], 0.7, mode="nearest")
+    return share

@@ -1,0 +1,96 @@
+"""Clips of many kinds whose truth is known: what a seed decides about each, as settings of the graph.
+
+Nothing is read off the embedded clip: every number is drawn from what laparoscopes, tissues and pulls are said to be.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+REST, LOAD, HOLD, AFTER = (0.2, 0.5), (0.4, 0.9), (0.5, 1.1), (0.5, 1.0)
+"""How long the tissue rests before the pull, is loaded, held, and seen once let go [s]."""
+RATES = (15.0, 20.0, 25.0, 30.0, 50.0, 60.0)
+"""Frames per second [1/s]."""
+FRAMES = 90
+"""Most frames of a clip: a faster camera sees a shorter one."""
+WIDTH, HEIGHT = 160, 128
+"""Of the pictures [px]."""
+CLOSED = 0.04
+"""The jaws are closed so long before the pull begins [s]."""
+
+
+def family(seed: int, count: int) -> dict[str, dict[str, Any]]:
+    """Name -> the keys of config.yaml that this clip changes, nested. The first clips of a seed are always the same."""
+    return {f"family-{seed}-{n}": draw(seed, n) for n in range(count)}
+
+
+def draw(seed: int, n: int) -> dict[str, Any]:
+    """One clip: camera, tissue, pull and picture quality, each from a generator of its own."""
+    camera, told = _camera(_generator(seed, n, "camera"))
+    fps, times = _times(_generator(seed, n, "times"))
+    phantom = {
+        "seed": int(_generator(seed, n, "phantom").integers(1, 2**31)),
+        "width": WIDTH,
+        "height": HEIGHT,
+        "fps": fps,
+        **camera,
+        **_tissue(_generator(seed, n, "tissue")),
+        **_pull(_generator(seed, n, "pull")),
+        **times,
+        **_picture(_generator(seed, n, "picture")),
+    }
+    return {"phantom": phantom, "ingest": {"focal": phantom["focal"] * WIDTH if told else None}}
+
+
+def _generator(seed: int, n: int, part: str) -> np.random.Generator:
+    return np.random.default_rng([seed, n, *part.encode()])
+
+
+def _camera(rng: np.random.Generator) -> tuple[dict[str, float], bool]:
+    """A view of 45 to 75 mm of tissue from 50 to 100 mm, its focal length told in one of two clips."""
+    distance = rng.uniform(0.05, 0.10)
+    focal = float(np.clip(distance / rng.uniform(0.045, 0.075), 0.75, 1.7))
+    return {"distance": distance, "focal": focal, "slant": rng.uniform(0, 0.6)}, bool(rng.random() < 0.5)
+
+
+def _times(rng: np.random.Generator) -> tuple[float, dict[str, float]]:
+    """Rest, load, hold, release; in one clip of five the grip never lets go."""
+    fps = float(rng.choice(RATES))
+    rest, load, hold, after = (rng.uniform(*ends) for ends in (REST, LOAD, HOLD, AFTER))
+    if rng.random() < 0.2:
+        hold, after = hold + after, 0.0
+    short = min(1.0, FRAMES / fps / (rest + load + hold + after))
+    begin, arrive, release, end = np.cumsum([rest, load, hold, after]) * short
+    times = {"grasp": begin - CLOSED, "load": begin, "hold": arrive, "release": release, "duration": end}
+    return fps, {name: float(t) for name, t in times.items()}
+
+
+def _tissue(rng: np.random.Generator) -> dict[str, Any]:
+    """E of .3 to 5 kPa, nu of .40 to .48, eta / E of 1 to 8 ms; 8 to 24 mm thick, its sides free or held."""
+    while True:
+        E, lag = 300 * math.exp(rng.uniform(0, math.log(5000 / 300))), 1e-3 * math.exp(rng.uniform(0, math.log(8)))
+        if E * lag < 12.0:
+            break
+    return {
+        "E": E,
+        "nu": rng.uniform(0.40, 0.48),
+        "eta": E * lag,
+        "thickness": rng.uniform(0.008, 0.024),
+        "relief": rng.uniform(0.5e-3, 2.5e-3),
+        "sides": str(rng.choice(["free", "held"])),
+    }
+
+
+def _pull(rng: np.random.Generator) -> dict[str, float]:
+    """5 to 11 mm, from along the tissue to steeply off it."""
+    return {
+        "pull": rng.uniform(5e-3, 11e-3),
+        "lift": rng.uniform(0.0, 1.2),
+        "grip_radius": rng.uniform(4e-3, 6.5e-3),
+    }
+
+
+def _picture(rng: np.random.Generator) -> dict[str, Any]:
+    """Sensor noise and compression."""
+    return {"noise": rng.uniform(0.003, 0.015), "crf": int(rng.integers(10, 28))}
