@@ -2,7 +2,7 @@
 
 reads   body.npz, scene.ply, tracks.npz, motion.npz, frames.npz, masks.npz, camera.json
 writes  material.npz (per particle), physics.json (laws, numbers, grid), fit.json (history, identifiability),
-        motion.npz (the grips as fitted)
+        motion.npz (the grips as fitted), body.npz (the body as it was laid for the fit)
 """
 
 from surgisim.artifacts.body import Body
@@ -29,7 +29,7 @@ from surgisim.stage import stage
         "masks": Masks,
         "camera": Camera,
     },
-    writes={"material": Material, "physics": Physics, "fit": Fit, "carried": Motion},
+    writes={"material": Material, "physics": Physics, "fit": Fit, "carried": Motion, "laid": Body},
     settings=Estimation,
 )
 def main(body, scene, tracks, motion, frames, masks, camera, *, settings, progress):

@@ -16,7 +16,7 @@ class Depth(Artifact):
     """How far to trust it, 0-1, (T, H, W) float32."""
     scale: Literal["known", "arbitrary"]
     follows: bool = True
-    """Whether its change from frame to frame is measured, in stereo for example; a guess from brightness alone is not."""
+    """Whether its change from frame to frame is measured, as in stereo; a guess from brightness alone is not."""
 
     UNITS = {"z": "m", "confidence": "1"}
 

@@ -4,6 +4,7 @@ A picture shows where held tissue goes across the view. How far it comes nearer,
 between two frames it is let go show in how the tissue around it moves, which is what a simulation knows.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,10 +13,11 @@ from scipy.ndimage import gaussian_filter1d
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
+from surgisim.estimation.unknown import Unknown
 
 TOWARD, TOWARD_MEASURED = 0.08, 0.01
-"""Spread of how far a grip comes nearer, as a share of its distance: a pull of some 5 to 10 mm at 50 to 100 mm, and what
-is left open of it where depth is measured in every frame."""
+"""Spread of how far a grip comes nearer, as a share of its distance: a pull of some 5 to 10 mm at 50 to 100 mm, and
+what is left open of it where depth is measured in every frame."""
 BESIDE = 0.02
 """Spread of where the held ball's middle is across the view, each way, as a share of its distance."""
 ACROSS, RADIUS = 0.05, 0.15
@@ -24,23 +26,6 @@ RELEASE, RELEASE_SPREAD, RELEASE_ENDS = 0.5, 0.6, (-2.0, 3.0)
 """Frames after its last active one at which a grip opens: between that frame and the next, if it was found rightly."""
 MOST = 1 / 3
 """Share of the farthest way that a tracked point must go to say how a pull went in time."""
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """One number beside the laws, searched as it is."""
-
-    name: str
-    start: float
-    spread: float
-    """Standard deviation of its prior about `start`."""
-    low: float
-    high: float
-    unit: str
-    logarithmic: bool = False
-    """Whether it is the logarithm of a factor."""
-    size: float = 1.0
-    """What 1 is, in `unit`."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +38,9 @@ class Carrying:
     """Share of its way that the pull has gone, (T,)."""
     unknowns: tuple[Unknown, ...]
 
-    def at(self, q: np.ndarray) -> Motion:
-        """The motion where the unknowns are q, (len(unknowns),)."""
-        found, value = self.motion, dict(zip((u.name for u in self.unknowns), q, strict=True))
+    def at(self, value: Mapping[str, float]) -> Motion:
+        """The motion where the unknowns have these values, by their names."""
+        found = self.motion
         position, radius, late = found.position.copy(), found.radius.copy(), found.late.copy()
         middle = np.array(found.center_rest, float)
         for j, center in enumerate(found.center_rest):

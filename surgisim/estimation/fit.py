@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,12 +20,13 @@ from surgisim.config.estimation import Estimation
 from surgisim.estimation.carrying import carrying
 from surgisim.estimation.damping import numerical_damping
 from surgisim.estimation.identify import identifiability, in_words
+from surgisim.estimation.lay import Laying, upright
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
 from surgisim.estimation.picture import picture_loss
 from surgisim.estimation.refine import Refined, refine
-from surgisim.estimation.rounds import INDEPENDENT, choose_support, number, search_softly, settle_grip
+from surgisim.estimation.rounds import INDEPENDENT, choose_start, choose_support, descend, number, settle_grip
 from surgisim.estimation.search import Search, search
-from surgisim.estimation.support import supports
+from surgisim.estimation.support import Support, open_depth, supports
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
 from surgisim.mpm.setup import Prepared, Values, prepare
 from surgisim.physics.catalogue import choose, columns
@@ -37,6 +39,18 @@ STILL = 0.5
 """Motion below which a track is taken to stand still [px]."""
 
 
+class Estimate(NamedTuple):
+    """What the estimation hands on."""
+
+    material: Material
+    physics: Physics
+    fit: Fit
+    motion: Motion
+    """How the instruments carry the tissue, as fitted."""
+    body: Body
+    """The body as it was laid for that."""
+
+
 def estimate(
     body: Body,
     scene: Scene,
@@ -47,8 +61,8 @@ def estimate(
     camera: Camera,
     settings: Estimation,
     progress: Say,
-) -> tuple[Material, Physics, Fit, Motion]:
-    """Material, physics and fit of one clip, and how its instruments carry the tissue, as fitted.
+) -> Estimate:
+    """What one clip tells of its tissue.
 
     Without a grip, or without motion, nothing drives the body and nothing can be learned: the
     parameters stay at their start values, and the fit says so.
@@ -68,74 +82,72 @@ def estimate(
     wanted = search(settings.terms, settings.start, settings.fixed)
     tracked = tracks.xyz[:, 0][np.isfinite(tracks.xyz[:, 0]).all(1)]
     carried = np.concatenate([scene.mean, tracked]).astype(float)
-    bodies = [
-        prepare(
+
+    def make(body: Body, motion: Motion) -> Prepared:
+        return prepare(
             body, tuple(settings.terms), density=settings.density, gravity=settings.gravity, carried=carried,
-            device=settings.device, form=settings.form, places=places,
-        )
-        for _ in range(WORKERS)
-    ]  # fmt: skip
+            device=settings.device, form=settings.form, places=places, grips=motion,
+        )  # fmt: skip
+
     reason = _nothing_to_learn(motion, tracks, body)
     if reason:
-        return *_unfitted(bodies[0], wanted, settings, camera, reason), motion
+        return Estimate(*_unfitted(make(body, motion), wanted, settings, camera, reason), motion, body)
+    bodies = [make(body, motion) for _ in range(WORKERS)]
     observation = observe(tracks, motion, camera, bodies[0].simulator, floor=0.02 * body.spacing)
-    if settings.enabled and settings.carrying:
-        measured = bool((observation.weight[..., 2] > 0).any())
-        wanted = replace(wanted, carrying=carrying(motion, tracks, camera, measured))
-        motion = wanted.motion(wanted.start, motion)
     total = len(frames.rgb)
     fitted = fitted_frames(frames.split)
     held_out = np.setdiff1d(np.arange(1, total), fitted)
     phase = phases(motion, total)
     trial = Trial(bodies, wanted, motion, observation, body.held, camera.fps, total, fitted, firm=False)
-    choices = supports(body, camera)
-    support, x, history, table = choices[0], wanted.start, [], {}
     if settings.enabled:
-        trial, _ = settle_grip(trial, history)
-        if settings.support:
-            support, x = choose_support(trial, choices, phase, history, progress)
-        trial = replace(trial, held=support.held)
-    trial, default = settle_grip(trial, history)
+        trial = _opened(trial, body, tracks, camera, settings, make)
+    parts = {
+        "held_out": held_out,
+        "after_release": np.intersect1d(held_out, np.flatnonzero(phase == PHASES.index("release"))),
+        "fitted_frames": fitted,
+    }
+    x, history, table = trial.wanted.start, [], {}
+    trial, run = settle_grip(trial, x, history)
+    before = {name: trial.stand(x)[0].observation.error(run.u, at) for name, at in parts.items()}
+    if trial.laying:
+        trial, x = choose_support(trial, supports(trial.laying.columns), phase, history, progress)
+        trial, _ = settle_grip(trial, x, history)
     if settings.enabled and wanted.free:
-        trial, solution = search_softly(trial, phase, settings, history, progress, x)
+        x = choose_start(trial, x, history, progress)
+        trial, solution = descend(trial, x, phase, settings, history, progress)
         x = solution.x
-        trial = replace(trial, motion=wanted.motion(x, trial.motion))
         phase_of = np.broadcast_to(phase[fitted][None, :, None], (len(observation.rest), len(fitted), 3)).ravel()
         table = identifiability(
-            solution, wanted, phase_of=phase_of, phase_names=PHASES, density=settings.density, length=support.depth,
-            independent=INDEPENDENT,
+            solution, trial.wanted, phase_of=phase_of, phase_names=PHASES, density=settings.density,
+            length=trial.depth(x), independent=INDEPENDENT,
         )  # fmt: skip
-    values = wanted.values(x)
-    theta, refined = trial.theta(values), None
+    support = Support(trial.depth(x), trial.laying.rim if trial.laying else bool(body.held[body.surface].any()))
+    values, trial = trial.wanted.values(x), trial.settled(x)
+    x, theta, refined = x[: len(wanted.free)], trial.theta(values), None
     if settings.enabled:
         theta, refined = _refined(trial, values, scene, frames, masks, camera, settings, progress)
-    trial, final = settle_grip(trial, history, theta, values)
-    path = trial.drive(values, stiffest=bodies[0].stiffest(theta))
-    errors = {
-        name: {"default": number(observation.error(default.u, at)), "fitted": number(observation.error(final.u, at))}
-        for name, at in {
-            "held_out": held_out,
-            "after_release": np.intersect1d(held_out, np.flatnonzero(phase == PHASES.index("release"))),
-            "fitted_frames": fitted,
-        }.items()
-    }
-    before, after = observation.error(default.u, held_out), observation.error(final.u, held_out)
-    progress(1.0, 1.0, f"held-out track error {after * 1e3:.3f} mm ({before * 1e3:.3f} mm with default parameters)")
+    trial, run = settle_grip(trial, x, history, theta)
+    prepared, laid = trial.bodies[0], trial.bodies[0].body
+    path = trial.drive(values, stiffest=prepared.stiffest(theta))
+    after = {name: trial.observation.error(run.u, at) for name, at in parts.items()}
+    apart = f"held-out track error {after['held_out'] * 1e3:.3f} mm"
+    progress(1.0, 1.0, f"{apart} ({before['held_out'] * 1e3:.3f} mm with default parameters)")
     if refined:
         history += [{"round": "field", **h} for h in refined.history]
     damping = None
     if settings.form == "total":
-        damping = numerical_damping(body, settings.density, values, support.held, path.step, settings.device)
+        damping = numerical_damping(laid, settings.density, values, trial.held, path.step, settings.device)
     fit = Fit(
         history=history,
         identifiability=table,
         held_out={
             "unit": "m",
-            **errors["held_out"],
-            "after_release_default": errors["after_release"]["default"],
-            "after_release_fitted": errors["after_release"]["fitted"],
-            "used_default": errors["fitted_frames"]["default"],
-            "used_fitted": errors["fitted_frames"]["fitted"],
+            "default": number(before["held_out"]),
+            "fitted": number(after["held_out"]),
+            "after_release_default": number(before["after_release"]),
+            "after_release_fitted": number(after["after_release"]),
+            "used_default": number(before["fitted_frames"]),
+            "used_fitted": number(after["fitted_frames"]),
             "frames": held_out.tolist(),
             "points": int(observation.moving.sum()),
             "field_kept": bool(refined.kept) if refined else False,
@@ -143,12 +155,30 @@ def estimate(
             "support": {"depth": support.depth, "rim": support.rim},
             "phases": [PHASES[k] for k in phase],
         },
-        words=in_words(table, support, trial.grip, path.per_frame, before, after, damping),
+        words=in_words(table, support, trial.grip, path.per_frame, before["held_out"], after["held_out"], damping),
         numerical_damping=damping,
     )
-    names = np.array(columns(choose(bodies[0].terms)))
-    material = Material(names, theta.astype(np.float32), support.held)
-    return material, _physics(bodies[0], values, table, settings, path.step, trial.grip), fit, trial.motion
+    names = np.array(columns(choose(prepared.terms)))
+    material = Material(names, theta.astype(np.float32), trial.held)
+    return Estimate(
+        material, _physics(prepared, values, table, settings, path.step, trial.grip), fit, trial.motion, laid
+    )
+
+
+def _opened(
+    trial: Trial, body: Body, tracks: Tracks, camera: Camera, settings: Estimation,
+    make: Callable[[Body, Motion], Prepared],
+) -> Trial:  # fmt: skip
+    """The trial with what else a clip leaves open beside the laws."""
+    wanted, motion = trial.wanted, trial.motion
+    if settings.carrying:
+        measured = bool((trial.observation.weight[..., 2] > 0).any())
+        wanted = replace(wanted, carrying=carrying(motion, tracks, camera, measured))
+    laid = upright(body, camera) if settings.support and settings.form == "total" else None
+    if laid is None:
+        return replace(trial, wanted=wanted)
+    laying = Laying(laid, bool(laid.rim.any()), trial.observation, make)
+    return replace(trial, wanted=replace(wanted, depth=open_depth(laid)), laying=laying)
 
 
 def _nothing_to_learn(motion: Motion, tracks: Tracks, body: Body) -> str:

@@ -1,6 +1,7 @@
 """What a simulation is compared with: tracked points of the surface, weighted by their noise."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy import sparse
@@ -29,6 +30,10 @@ class Observation:
     """1 / standard deviation of each component [1/m], (K, T, 3), zero where not seen or not to be used."""
     carry: sparse.csr_matrix
     """Active nodes to points, (K, A)."""
+
+    def carried_by(self, simulator: Simulator) -> Self:
+        """The same points on another grid."""
+        return replace(self, carry=simulator.carry(self.rest).tocsr())
 
     def residual(self, u: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Weighted difference, simulated minus seen, at `frames`, (K, len(frames), 3); u is (T, A, 3)."""

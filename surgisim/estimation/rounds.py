@@ -34,18 +34,20 @@ SETTLED = 4
 Say = Callable[[float, float, str], None]
 
 
-def settle_grip(trial: Trial, history: list, theta=None, values=None) -> tuple[Trial, Run]:
-    """The trial with the firmest grip, not firmer than its own, under which the whole clip can be simulated.
+def settle_grip(trial: Trial, x: np.ndarray, history: list, theta=None) -> tuple[Trial, Run]:
+    """The trial with the firmest grip, not firmer than its own, under which the whole clip can be simulated at x.
 
     Tracks at the jaws are the worst there are, and a firm grip that follows them can turn the tissue inside
-    out; a softer one lets it slip. theta: per-particle parameters (P, M) about the uniform `values`; those of
-    the start if None. Raises Problem when even the softest does not help.
+    out; a softer one lets it slip. theta: per-particle parameters, (P, M), of a settled trial; uniform if None. Raises
+    Problem when even the softest does not help.
     """
-    body, values = trial.bodies[0], values or trial.wanted.values(trial.wanted.start)
-    theta = trial.theta(values) if theta is None else theta
+    values = trial.wanted.values(x)
     for share in [g for g in GRIPS if g <= trial.grip]:
         softer = replace(trial, grip=share)
         try:
+            if theta is None:
+                return softer, softer.run(x)
+            body = softer.bodies[0]
             return softer, body.simulator.run(theta, softer.drive(values, stiffest=body.stiffest(theta)))
         except Breakdown as breakdown:
             history.append({"round": "grip", "share": share, "cost": None, "broke": str(breakdown)})
@@ -57,28 +59,34 @@ def settle_grip(trial: Trial, history: list, theta=None, values=None) -> tuple[T
 
 def choose_support(
     trial: Trial, choices: list[Support], phase: np.ndarray, history: list, say: Say
-) -> tuple[Support, np.ndarray]:
-    """The support whose pull and hold fit best, and where that was; the body's own unless another is clearly better."""
+) -> tuple[Trial, np.ndarray]:
+    """The trial with the rim whose pull and hold fit best, and the point to begin from with it.
+
+    The body as it was thickened stays unless another is clearly better.
+    """
+    wanted, start = trial.wanted, trial.wanted.start
     driven = trial.fitted[phase[trial.fitted] < PHASES.index("release")]
-    ratios = [k for k, (_, p, _) in enumerate(trial.wanted.free) if p == "nu"]
-    nearer = [k for k, name in enumerate(trial.wanted.names) if name.endswith(".toward")]
-    if len(choices) < 2 or not len(driven):
-        return choices[0], trial.wanted.start
+    at = {n: k for k, n in enumerate(wanted.names)}
+    ratios = [k for k, (_, p, _) in enumerate(wanted.free) if p == "nu"]
+    nearer = [k for n, k in at.items() if n.endswith(".toward")]
+    if not len(driven):
+        return trial, start
     last = int(driven[-1])
-    points = []
-    for value, share in itertools.product(RATIOS if ratios else (None,), NEARER if nearer else (None,)):
-        x = trial.wanted.start.copy()
-        if ratios:
-            x[ratios] = value
-        if nearer:
-            x[nearer] = share * trial.wanted.spread[nearer]
-        points.append(x)
-    jobs = [(choice, x) for choice in choices for x in points]
+    jobs = []
+    for choice in choices:
+        for value, share in itertools.product(RATIOS if ratios else (None,), NEARER if nearer else (None,)):
+            x = start.copy()
+            x[at[wanted.depth.name]] = np.log(choice.depth / wanted.depth.size)
+            if ratios:
+                x[ratios] = value
+            if nearer:
+                x[nearer] = share * wanted.spread[nearer]
+            jobs.append((choice, np.clip(x, *wanted.bounds)))
     say(0.03, 1.0, f"comparing {len(choices)} ways the body may be held")
 
     def cost(job, worker):
         choice, x = job
-        r = replace(trial, held=choice.held).residual(x, worker, last)
+        r = with_rim(trial, choice.rim).residual(x, worker, last)
         return np.inf if r is None else INDEPENDENT * misfit(r)
 
     every = np.array(at_once(cost, jobs)).reshape(len(choices), -1)
@@ -87,7 +95,13 @@ def choose_support(
         history.append({"round": "support", "depth": choice.depth, "rim": choice.rim, "cost": number(c)})
     best = int(np.argmin(costs))
     best = best if costs[best] < 0.95 * costs[0] else 0
-    return choices[best], points[int(np.argmin(every[best]))]
+    here = best * every.shape[1] + int(np.argmin(every[best]))
+    return with_rim(trial, choices[best].rim), jobs[here][1]
+
+
+def with_rim(trial: Trial, rim: bool) -> Trial:
+    """The trial whose bodies are held at their rim, or not."""
+    return replace(trial, laying=replace(trial.laying, rim=rim))
 
 
 def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np.ndarray:
@@ -112,50 +126,52 @@ def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np
     return points[int(np.argmin(costs))]
 
 
-def search_softly(
-    trial: Trial, phase: np.ndarray, settings: Estimation, history: list, say: Say, begin: np.ndarray | None = None
+def descend(
+    trial: Trial, x: np.ndarray, phase: np.ndarray, settings: Estimation, history: list, say: Say
 ) -> tuple[Trial, Solution]:
-    """Start and descent, with a softer grip each time the search leaves where the clip can be simulated."""
-    while True:
-        try:
-            return trial, descend(trial, choose_start(trial, begin, history, say), phase, settings, history, say)
-        except Breakdown as breakdown:
-            softer = [g for g in GRIPS if g < trial.grip]
-            if not softer:
-                raise
-            history.append({"round": "grip", "share": trial.grip, "cost": None, "broke": str(breakdown)})
-            trial = replace(trial, grip=softer[0])
-
-
-def descend(trial: Trial, x: np.ndarray, phase: np.ndarray, settings: Estimation, history: list, say: Say) -> Solution:
-    """Gauss-Newton over growing windows from x."""
-    wanted, ends, start = trial.wanted, windows(trial.fitted, phase, settings.first_window), x
+    """Gauss-Newton over growing windows from x, with a softer grip from where on a firmer one cannot be simulated."""
+    wanted, ends = trial.wanted, windows(trial.fitted, phase, settings.first_window)
     for k, last in enumerate(ends):
-        # What fits a window may turn the tissue inside out in the next; the start survived the whole clip.
-        if k and trial.residual(x, last=last) is None:
-            history.append({"round": k, "last_frame": int(last), "cost": None} | plain(wanted, x))
-            x = start
+        # What fits a window may turn the tissue inside out in the next.
+        while trial.residual(x, last=last) is None:
+            trial = _softer(trial, history, "what fits a shorter window cannot be simulated in a longer one")
+        solution = None
+        while solution is None:
 
-        def said(iteration, x, cost, k=k, last=last):
-            values = {n: float(f"{v:.4g}") for n, v in plain(wanted, x).items()}
-            history.append({"round": k, "last_frame": int(last), "iteration": iteration, "cost": cost} | values)
-            done = 0.25 + 0.45 * (k + iteration / settings.iterations) / len(ends)
-            say(done, 1.0, f"round {k + 1}/{len(ends)}, iteration {iteration}: {values}")
+            def said(iteration, now, cost, k=k, last=last):
+                nonlocal x
+                x = now
+                values = {n: float(f"{v:.4g}") for n, v in plain(wanted, x).items()}
+                history.append({"round": k, "last_frame": int(last), "iteration": iteration, "cost": cost} | values)
+                done = 0.25 + 0.45 * (k + iteration / settings.iterations) / len(ends)
+                say(done, 1.0, f"round {k + 1}/{len(ends)}, iteration {iteration}: {values}")
 
-        solution = gauss_newton(
-            partial(trial.residual, last=last),
-            x,
-            prior=wanted.start,
-            spread=wanted.spread,
-            bounds=wanted.bounds,
-            share=INDEPENDENT,
-            iterations=settings.iterations,
-            workers=WORKERS,
-            said=said,
-            together=partial(trial.together, last=last),
-        )
+            try:
+                solution = gauss_newton(
+                    partial(trial.residual, last=last),
+                    x,
+                    prior=wanted.start,
+                    spread=wanted.spread,
+                    bounds=wanted.bounds,
+                    share=INDEPENDENT,
+                    iterations=settings.iterations,
+                    workers=WORKERS,
+                    said=said,
+                    together=partial(trial.together, last=last),
+                )
+            except Breakdown as breakdown:
+                trial = _softer(trial, history, str(breakdown))
         x = solution.x
-    return solution
+    return trial, solution
+
+
+def _softer(trial: Trial, history: list, why: str) -> Trial:
+    """The trial with the next softer grip; raises Breakdown where there is none."""
+    softer = [g for g in GRIPS if g < trial.grip]
+    if not softer:
+        raise Breakdown(f"estimation: {why}, however softly the tissue is held. Check the grip and its path (--grasp).")
+    history.append({"round": "grip", "share": trial.grip, "cost": None, "broke": why})
+    return replace(trial, grip=softer[0])
 
 
 def windows(fitted: np.ndarray, phase: np.ndarray, share: float) -> list[int]:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from surgisim.artifacts.motion import Motion
-from surgisim.estimation.carrying import Carrying, Unknown
+from surgisim.estimation.carrying import Carrying
+from surgisim.estimation.unknown import Unknown
 from surgisim.mpm.setup import Values
 from surgisim.physics.catalogue import Param, choose
 from surgisim.problem import Problem
@@ -31,6 +32,8 @@ class Search:
     """Every parameter's start value."""
     carrying: Carrying | None = None
     """What is open of the grips, fitted too."""
+    depth: Unknown | None = None
+    """How deep the tissue is held, fitted too."""
 
     @property
     def names(self) -> list[str]:
@@ -39,7 +42,7 @@ class Search:
     @property
     def open(self) -> tuple[Unknown, ...]:
         """Numbers beside the laws'."""
-        return self.carrying.unknowns if self.carrying else ()
+        return (*(self.carrying.unknowns if self.carrying else ()), *([self.depth] if self.depth else []))
 
     @property
     def start(self) -> np.ndarray:
@@ -84,10 +87,23 @@ class Search:
 
     def motion(self, x: np.ndarray, found: Motion) -> Motion:
         """How the instruments carry the tissue at x: as `found` where nothing is open."""
-        return self.carrying.at(x[len(self.free) :]) if self.carrying else found
+        return self.carrying.at(self._opened(x)) if self.carrying else found
+
+    def held_from(self, x: np.ndarray) -> float:
+        """How deep the tissue is held at x [m]."""
+        return self.depth.size * float(np.exp(self._opened(x)[self.depth.name]))
+
+    def _opened(self, x: np.ndarray) -> dict[str, float]:
+        return dict(zip((u.name for u in self.open), x[len(self.free) :].tolist(), strict=True))
 
 
-def search(terms: list[str], start: Values, fixed: list[str], carrying: Carrying | None = None) -> Search:
+def search(
+    terms: list[str],
+    start: Values,
+    fixed: list[str],
+    carrying: Carrying | None = None,
+    depth: Unknown | None = None,
+) -> Search:
     """Everything the laws have, less what is fixed; refuses names that do not exist and values out of range."""
     chosen = choose(terms)
     known = {f"{law}.{p}" for law, t in chosen.items() for p in t.params}
@@ -108,7 +124,7 @@ def search(terms: list[str], start: Values, fixed: list[str], carrying: Carrying
             # A logarithm cannot leave an off value of zero: a law that starts silent stays so.
             if f"{law}.{name}" not in fixed and not (p.logarithmic and value <= 0):
                 free.append((law, name, p))
-    return Search(tuple(terms), tuple(free), base, carrying)
+    return Search(tuple(terms), tuple(free), base, carrying, depth)
 
 
 def _forward(p: Param, value: float) -> float:

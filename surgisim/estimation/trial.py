@@ -2,14 +2,15 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from threading import Lock
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from surgisim.artifacts.motion import Motion
+from surgisim.estimation.lay import Laying
 from surgisim.estimation.observation import Observation
 from surgisim.estimation.search import Search
 from surgisim.mpm.batch import Batch
@@ -40,6 +41,31 @@ class Trial:
     """How firmly instruments hold, see Physics."""
     firm: bool = True
     """Whether the boundary is known to hold there, see Prepared.drive."""
+    laying: Laying | None = None
+    """Where bodies come from that are laid anew as the search goes; none where `bodies` stay."""
+
+    def stand(self, x: np.ndarray, worker: int = 0) -> tuple["Trial", Motion]:
+        """This trial with the body that x asks for, and how that is carried."""
+        motion = self.wanted.motion(x, self.motion)
+        if self.laying is None:
+            return self, motion
+        body, observation = self.laying.at(self.wanted.held_from(x), motion, worker)
+        bodies = [body] * len(self.bodies)
+        return replace(self, bodies=bodies, observation=observation, held=body.body.held, laying=None), motion
+
+    def depth(self, x: np.ndarray) -> float:
+        """How deep the tissue is held at x [m]."""
+        if self.laying:
+            return self.wanted.held_from(x)
+        body = self.bodies[0].body
+        under = self.held & ~body.surface
+        deepest = body.rest[under if under.any() else slice(None), 2]
+        return float(np.median(deepest) - np.median(body.rest[body.surface, 2]))
+
+    def settled(self, x: np.ndarray) -> Self:
+        """The trial of the body and the motion at x, where nothing but the laws' numbers can change any more."""
+        here, motion = self.stand(x)
+        return replace(here, motion=motion, wanted=replace(self.wanted, carrying=None, depth=None))
 
     def per_frame(self, values: Values, *, safety: float = SAFETY, stiffest=None) -> int:
         """Steps between two frames that are stable for `stiffest` (or `values`)."""
@@ -53,8 +79,8 @@ class Trial:
         """`motion` (the clip's), at a step that is stable for `stiffest` (or `values`) if `per_frame` is not given."""
         per_frame = per_frame or self.per_frame(values, safety=safety, stiffest=stiffest)
         return self.bodies[0].drive(
-            motion or self.motion, values, fps=self.fps, per_frame=per_frame, frames=frames or self.frames, held=self.held,
-            grip=self.grip, firm=self.firm,
+            motion or self.motion, values, fps=self.fps, per_frame=per_frame, frames=frames or self.frames,
+            held=self.held, grip=self.grip, firm=self.firm,
         )  # fmt: skip
 
     def theta(self, values: Values) -> np.ndarray:
@@ -63,23 +89,26 @@ class Trial:
 
     def run(self, x: np.ndarray, worker: int = 0, last: int | None = None) -> Run:
         """Simulate at x, up to frame `last`."""
-        values = self.wanted.values(x)
-        body = self.bodies[worker]
-        drive = self.drive(values, motion=self.wanted.motion(x, self.motion))
-        return body.simulator.run(self.theta(values), drive, last=last)
+        return self._run(x, worker, last)[0]
 
     def residual(self, x: np.ndarray, worker: int = 0, last: int | None = None) -> np.ndarray | None:
         """Weighted misfit of the tracks on fitted frames up to `last`, flat; None where x cannot be simulated."""
         last = int(self.fitted[-1]) if last is None else last
         try:
-            run = self.run(x, worker, last)
+            run, observation = self._run(x, worker, last)
         except Breakdown:
             return None
-        return self.observation.residual(run.u, self.fitted[self.fitted <= last]).ravel()
+        return observation.residual(run.u, self.fitted[self.fitted <= last]).ravel()
+
+    def _run(self, x: np.ndarray, worker: int, last: int | None) -> tuple[Run, Observation]:
+        values = self.wanted.values(x)
+        here, motion = self.stand(x, worker)
+        drive = here.drive(values, motion=motion)
+        return here.bodies[worker].simulator.run(here.theta(values), drive, last=last), here.observation
 
     def together(self, points: list[np.ndarray], last: int | None = None) -> list[np.ndarray | None]:
         """`residual` at several x: side by side in one run on a GPU, on two threads on a CPU."""
-        if self.bodies[0].simulator.device == "cpu":
+        if self.bodies[0].simulator.device == "cpu" or self.laying:
             return at_once(lambda x, worker: self.residual(x, worker, last), points)
         last = int(self.fitted[-1]) if last is None else last
         values = [self.wanted.values(x) for x in points]

@@ -101,6 +101,7 @@ def _parts(body: Body, scene: Scene, physics: Physics, task: Plan, device: str) 
         prepare(
             body, tuple(physics.terms), density=physics.density, gravity=tuple(physics.gravity),
             carried=scene.mean.astype(float), cut=cut, device=device, form=physics.form, threads=THREADS,
+            grips=task.motion,
         )
         for cut in make
     ]  # fmt: skip

@@ -6,11 +6,11 @@ A clip that went through the graph becomes a recording folder, and is diagnosed 
 
 rule recorded:
     input:
-        body=upstream("thickening", "body.npz"),
+        body=upstream("estimation", "body.npz"),
         material=upstream("estimation", "material.npz"),
         physics=upstream("estimation", "physics.json"),
         tracks=upstream("tracking", "tracks.npz"),
-        motion=upstream("tracking", "motion.npz"),
+        motion=upstream("estimation", "motion.npz"),
         frames=upstream("ingest", "frames.npz"),
         camera=upstream("ingest", "camera.json"),
     output:

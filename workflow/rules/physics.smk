@@ -15,6 +15,7 @@ rule estimation:
         physics="results/{clip}/{variant}/estimation/physics.json",
         fit="results/{clip}/{variant}/estimation/fit.json",
         carried="results/{clip}/{variant}/estimation/motion.npz",
+        laid="results/{clip}/{variant}/estimation/body.npz",
     log:
         "logs/{clip}/{variant}/estimation.log",
     benchmark:
@@ -33,13 +34,13 @@ rule estimation:
         " --body {input.body} --scene {input.scene} --tracks {input.tracks} --motion {input.motion}"
         " --frames {input.frames} --masks {input.masks} --camera {input.camera}"
         " --material {output.material} --physics {output.physics} --fit {output.fit}"
-        " --carried {output.carried}"
+        " --carried {output.carried} --laid {output.laid}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
 rule simulation:
     input:
-        body=upstream("thickening", "body.npz"),
+        body=upstream("estimation", "body.npz"),
         scene=upstream("reconstruction", "scene.ply"),
         material=upstream("estimation", "material.npz"),
         physics=upstream("estimation", "physics.json"),

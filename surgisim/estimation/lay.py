@@ -1,0 +1,119 @@
+"""The body laid anew with its held base at a chosen depth.
+
+A camera does not see where tissue is held. Thickening fills everything behind the surface; here each column of it is
+cut at one depth below the surface, with whole layers above the cut, so that the depth can change by any amount and the
+simulation with it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from surgisim.artifacts.body import Body
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.motion import Motion
+from surgisim.estimation.observation import Observation
+from surgisim.mpm.setup import Prepared
+
+KEPT = 3
+"""Bodies kept for each worker: one that several numbers are varied on, and the last ones beside it."""
+BELOW = 1.0
+"""Held tissue below the cut, in grid cells: as far as the splines of what moves reach down."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A thickened body as columns along z."""
+
+    xy: np.ndarray
+    """Camera frame [m], (N, 2)."""
+    begin: np.ndarray
+    """Where each column of tissue begins [m], (N,)."""
+    above: np.ndarray
+    """Depth of the seen surface above it [m], (N,)."""
+    area: np.ndarray
+    """Cross-section [m^2], (N,)."""
+    color: np.ndarray
+    """sRGB 0-1, (N, 3)."""
+    seen: np.ndarray
+    """Whether it begins at the seen surface, (N,) bool."""
+    rim: np.ndarray
+    """Whether it stands at the body's border, (N,) bool."""
+    spacing: float
+    """Of the grid [m]."""
+    layer: float
+    """Height of a layer of particles [m]."""
+    thickness: float
+    """How much tissue was laid below the surface, at the median column [m]."""
+
+    def laid(self, depth: float, *, rim: bool) -> Body:
+        """The body whose tissue is held from `depth` [m] below the surface on, and at its rim or not."""
+        end = self.above + depth
+        free = np.maximum(np.rint((end - self.begin) / self.layer), 0).astype(int)
+        held = max(1, round(BELOW * self.spacing / self.layer))
+        kept = free > 0
+        high = np.where(kept, (end - self.begin) / np.maximum(free, 1), self.layer)
+        count = np.where(kept, free + held, 0)
+        owner = np.repeat(np.arange(len(count)), count)
+        level = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+        under = level >= free[owner]
+        z = np.where(
+            under,
+            end[owner] + (level - free[owner] + 0.5) * self.layer,
+            self.begin[owner] + (level + 0.5) * high[owner],
+        )
+        volume = self.area[owner] * np.where(under, self.layer, high[owner])
+        return Body(
+            rest=np.concatenate([self.xy[owner], z[:, None]], 1).astype(np.float32),
+            volume=volume.astype(np.float32),
+            color=self.color[owner].astype(np.float32),
+            surface=(level == 0) & self.seen[owner],
+            held=under | (rim & self.rim[owner]),
+            spacing=self.spacing,
+        )
+
+
+@dataclass(frozen=True)
+class Laying:
+    """Bodies for every depth and grip that a search comes to, each made once while it is needed."""
+
+    columns: Columns
+    rim: bool
+    observation: Observation
+    make: Callable[[Body, Motion], Prepared]
+    """Prepare a body under a motion whose grips it will feel."""
+    kept: dict = field(default_factory=dict, compare=False)
+
+    def at(self, depth: float, motion: Motion, worker: int) -> tuple[Prepared, Observation]:
+        """A body held from `depth` [m] on, and what it is compared with; `worker`: whose arrays it uses."""
+        key = (round(depth, 7), np.round(motion.center_rest, 7).tobytes(), np.round(motion.radius, 7).tobytes())
+        mine = self.kept.setdefault((worker, self.rim), {})
+        if key not in mine:
+            if len(mine) >= KEPT:
+                mine.pop(next(iter(mine)))
+            prepared = self.make(self.columns.laid(depth, rim=self.rim), motion)
+            mine[key] = prepared, self.observation.carried_by(prepared.simulator)
+        return mine[key]
+
+
+def upright(body: Body, camera: Camera) -> Columns | None:
+    """What `thicken` laid, read back: columns share their place across the view, to rounding. None if it has none."""
+    rest = body.rest.astype(float)
+    place, owner, count = np.unique(np.round(rest[:, :2], 7), axis=0, return_inverse=True, return_counts=True)
+    owner = owner.ravel()
+    if np.median(count) < 2:
+        return None
+    order = np.lexsort((rest[:, 2], owner))
+    first = order[np.concatenate([[0], np.cumsum(count)[:-1]])]
+    last = order[np.cumsum(count) - 1]
+    layer = float(np.median(np.diff(rest[order, 2])[np.diff(owner[order]) == 0]))
+    area = np.bincount(owner, body.volume.astype(float)) / (rest[last, 2] - rest[first, 2] + layer)
+    begin = rest[first, 2] - 0.5 * body.volume[first] / area
+    seen = body.surface[first]
+    top = cKDTree(camera.project(rest[first][seen])).query(camera.project(rest[first]))[1]
+    above = np.where(seen, begin, np.minimum(begin[seen][top], begin))
+    thickness = float(np.median(rest[last, 2] - rest[first, 2]) + layer)
+    rim = body.held[first]
+    return Columns(place, begin, above, area, body.color[first], seen, rim, body.spacing, layer, thickness)
