@@ -26,7 +26,7 @@ from surgisim.estimation.picture import picture_loss
 from surgisim.estimation.refine import Refined, refine
 from surgisim.estimation.rounds import INDEPENDENT, choose_start, choose_support, descend, number, settle_grip
 from surgisim.estimation.search import Search, search
-from surgisim.estimation.support import Support, open_depth, supports
+from surgisim.estimation.support import EDGES, Support, open_depth
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
 from surgisim.mpm.setup import Prepared, Values, prepare
 from surgisim.physics.catalogue import choose, columns
@@ -110,7 +110,7 @@ def estimate(
     trial, run = settle_grip(trial, x, history)
     before = {name: trial.stand(x)[0].observation.error(run.u, at) for name, at in parts.items()}
     if trial.laying:
-        trial, x = choose_support(trial, supports(trial.laying.columns), phase, history, progress)
+        trial, x = choose_support(trial, phase, history, progress)
         trial, _ = settle_grip(trial, x, history)
     if settings.enabled and wanted.free:
         x = choose_start(trial, x, history, progress)
@@ -121,7 +121,8 @@ def estimate(
             solution, trial.wanted, phase_of=phase_of, phase_names=PHASES, density=settings.density,
             length=trial.depth(x), independent=INDEPENDENT,
         )  # fmt: skip
-    support = Support(trial.depth(x), trial.laying.rim if trial.laying else bool(body.held[body.surface].any()))
+    edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
+    support = Support(trial.depth(x), *edge)
     values, trial = trial.wanted.values(x), trial.settled(x)
     x, theta, refined = x[: len(wanted.free)], trial.theta(values), None
     if settings.enabled:
@@ -152,7 +153,7 @@ def estimate(
             "points": int(observation.moving.sum()),
             "field_kept": bool(refined.kept) if refined else False,
             "grip": trial.grip,
-            "support": {"depth": support.depth, "rim": support.rim},
+            "support": asdict(support),
             "phases": [PHASES[k] for k in phase],
         },
         words=in_words(table, support, trial.grip, path.per_frame, before["held_out"], after["held_out"], damping),
@@ -177,8 +178,9 @@ def _opened(
     laid = upright(body, camera) if settings.support and settings.form == "total" else None
     if laid is None:
         return replace(trial, wanted=wanted)
-    laying = Laying(laid, bool(laid.rim.any()), trial.observation, make)
-    return replace(trial, wanted=replace(wanted, depth=open_depth(laid)), laying=laying)
+    depth = open_depth(laid)
+    laying = Laying(laid, EDGES[0].beyond * depth.size, EDGES[0].rim, trial.observation, make)
+    return replace(trial, wanted=replace(wanted, depth=depth), laying=laying)
 
 
 def _nothing_to_learn(motion: Motion, tracks: Tracks, body: Body) -> str:

@@ -107,8 +107,8 @@ def in_words(
         f"On frames that were never fitted, simulated and tracked points of the moving tissue are "
         f"{after * 1e3:.3f} mm apart on average ({before * 1e3:.3f} mm with default parameters), "
         f"with {steps} steps a frame.",
-        f"It moves most like tissue held {support.depth * 1e3:.0f} mm below its surface, with its rim "
-        f"{'held' if support.rim else 'free'}.",
+        f"It moves most like tissue held {support.depth * 1e3:.0f} mm below its surface that goes on "
+        f"{support.beyond * 1e3:.0f} mm beyond what is seen and is {'held' if support.rim else 'free'} there.",
     ]
     if grip < 1:
         parts.append(

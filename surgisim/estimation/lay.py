@@ -6,7 +6,9 @@ simulation with it.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -19,6 +21,8 @@ from surgisim.mpm.setup import Prepared
 
 KEPT = 3
 """Bodies kept for each worker: one that several numbers are varied on, and the last ones beside it."""
+NEIGHBOURS = 60
+"""Columns whose plane the surface follows beyond what is seen."""
 BELOW = 1.0
 """Held tissue below the cut, in grid cells: as far as the splines of what moves reach down."""
 
@@ -75,25 +79,70 @@ class Columns:
         )
 
 
+def beyond(columns: Columns, margin: float) -> Columns:
+    """The same with tissue around it as far as `margin` [m], its surface going on as the nearest part of it lies.
+
+    Tissue does not end where the picture does. Beyond it the surface is the plane of the nearest columns.
+    """
+    width = np.sqrt(np.median(columns.area))
+    low, high = columns.xy.min(0), columns.xy.max(0)
+    more = int(np.ceil(margin / width))
+    x, y = (np.arange(-more, round((high[a] - low[a]) / width) + more + 1) * width + low[a] for a in range(2))
+    around = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
+    known = cKDTree(columns.xy)
+    away = known.query(around)[0]
+    around = around[(away > 0.7 * width) & (away <= margin)]
+    near = known.query(around, k=min(NEIGHBOURS, len(columns.xy)))[1]
+    place, z = columns.xy[near], columns.above[near]
+    centre = place.mean(1, keepdims=True)
+    slope = np.linalg.pinv(place - centre) @ (z - z.mean(1, keepdims=True))[..., None]
+    above = z.mean(1) + ((around[:, None] - centre) @ slope)[:, 0, 0]
+    count = len(around)
+    edge = cKDTree(around).query(around, k=5)[0][:, 4] > 1.2 * width
+    return replace(
+        columns,
+        xy=np.concatenate([columns.xy, around]),
+        begin=np.concatenate([columns.above, above]),
+        above=np.concatenate([columns.above, above]),
+        area=np.concatenate([columns.area, np.full(count, width**2)]),
+        color=np.concatenate([columns.color, columns.color[near[:, 0]]]),
+        seen=np.concatenate([columns.seen, np.zeros(count, bool)]),
+        rim=np.concatenate([np.zeros(len(columns.rim), bool), edge]),
+    )
+
+
 @dataclass(frozen=True)
 class Laying:
     """Bodies for every depth and grip that a search comes to, each made once while it is needed."""
 
     columns: Columns
+    """Of what is seen."""
+    margin: float
+    """How far tissue goes on beyond that [m]."""
     rim: bool
+    """Whether it is held where it ends there."""
     observation: Observation
     make: Callable[[Body, Motion], Prepared]
     """Prepare a body under a motion whose grips it will feel."""
     kept: dict = field(default_factory=dict, compare=False)
 
+    def ending(self, margin: float, rim: bool) -> Self:
+        """The same with another edge."""
+        return replace(self, margin=margin, rim=rim, kept={})
+
+    @cached_property
+    def whole(self) -> Columns:
+        """With what lies beyond the picture."""
+        return beyond(self.columns, self.margin) if self.margin > 0 else self.columns
+
     def at(self, depth: float, motion: Motion, worker: int) -> tuple[Prepared, Observation]:
         """A body held from `depth` [m] on, and what it is compared with; `worker`: whose arrays it uses."""
         key = (round(depth, 7), np.round(motion.center_rest, 7).tobytes(), np.round(motion.radius, 7).tobytes())
-        mine = self.kept.setdefault((worker, self.rim), {})
+        mine = self.kept.setdefault(worker, {})
         if key not in mine:
             if len(mine) >= KEPT:
                 mine.pop(next(iter(mine)))
-            prepared = self.make(self.columns.laid(depth, rim=self.rim), motion)
+            prepared = self.make(self.whole.laid(depth, rim=self.rim), motion)
             mine[key] = prepared, self.observation.carried_by(prepared.simulator)
         return mine[key]
 

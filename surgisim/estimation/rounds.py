@@ -15,7 +15,7 @@ from surgisim.config.estimation import Estimation
 from surgisim.estimation.gauss_newton import Solution, gauss_newton, misfit
 from surgisim.estimation.observation import PHASES
 from surgisim.estimation.search import Search
-from surgisim.estimation.support import Support
+from surgisim.estimation.support import EDGES, MIDDLE, SHARES
 from surgisim.estimation.trial import WORKERS, Trial, at_once
 from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.problem import Problem
@@ -57,51 +57,44 @@ def settle_grip(trial: Trial, x: np.ndarray, history: list, theta=None) -> tuple
     )
 
 
-def choose_support(
-    trial: Trial, choices: list[Support], phase: np.ndarray, history: list, say: Say
-) -> tuple[Trial, np.ndarray]:
-    """The trial with the rim whose pull and hold fit best, and the point to begin from with it.
+def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> tuple[Trial, np.ndarray]:
+    """The trial with the edge whose pull and hold fit best, and the point to begin from with it.
 
-    The body as it was thickened stays unless another is clearly better.
+    Depth, Poisson's ratio and how far the grip comes nearer all shape the spread of a load, so none is judged alone:
+    first these on the most expected edge, then the other edges at the best of them.
     """
     wanted, start = trial.wanted, trial.wanted.start
     driven = trial.fitted[phase[trial.fitted] < PHASES.index("release")]
-    at = {n: k for k, n in enumerate(wanted.names)}
-    ratios = [k for k, (_, p, _) in enumerate(wanted.free) if p == "nu"]
-    nearer = [k for n, k in at.items() if n.endswith(".toward")]
     if not len(driven):
         return trial, start
     last = int(driven[-1])
-    jobs = []
-    for choice in choices:
-        for value, share in itertools.product(RATIOS if ratios else (None,), NEARER if nearer else (None,)):
-            x = start.copy()
-            x[at[wanted.depth.name]] = np.log(choice.depth / wanted.depth.size)
-            if ratios:
-                x[ratios] = value
-            if nearer:
-                x[nearer] = share * wanted.spread[nearer]
-            jobs.append((choice, np.clip(x, *wanted.bounds)))
-    say(0.03, 1.0, f"comparing {len(choices)} ways the body may be held")
+    ratios = [k for k, (_, p, _) in enumerate(wanted.free) if p == "nu"]
+    nearer = [k for k, name in enumerate(wanted.names) if name.endswith(".toward")]
+    points = []
+    depths = np.log(np.array(SHARES) / MIDDLE)
+    tried = itertools.product(depths, RATIOS if ratios else (None,), NEARER if nearer else (None,))
+    for depth, value, share in tried:
+        x = start.copy()
+        x[wanted.names.index(wanted.depth.name)] = depth
+        if ratios:
+            x[ratios] = value
+        if nearer:
+            x[nearer] = share * wanted.spread[nearer]
+        points.append(np.clip(x, *wanted.bounds))
+    edges = [replace(trial, laying=trial.laying.ending(e.beyond * wanted.depth.size, e.rim)) for e in EDGES]
+    say(0.03, 1.0, f"comparing {len(points) + len(edges) - 1} ways the body may be held")
 
     def cost(job, worker):
-        choice, x = job
-        r = with_rim(trial, choice.rim).residual(x, worker, last)
+        edge, x = job
+        r = edge.residual(x, worker, last)
         return np.inf if r is None else INDEPENDENT * misfit(r)
 
-    every = np.array(at_once(cost, jobs)).reshape(len(choices), -1)
-    costs = every.min(1)
-    for choice, c in zip(choices, costs, strict=True):
-        history.append({"round": "support", "depth": choice.depth, "rim": choice.rim, "cost": number(c)})
-    best = int(np.argmin(costs))
-    best = best if costs[best] < 0.95 * costs[0] else 0
-    here = best * every.shape[1] + int(np.argmin(every[best]))
-    return with_rim(trial, choices[best].rim), jobs[here][1]
-
-
-def with_rim(trial: Trial, rim: bool) -> Trial:
-    """The trial whose bodies are held at their rim, or not."""
-    return replace(trial, laying=replace(trial.laying, rim=rim))
+    costs = at_once(cost, [(edges[0], x) for x in points])
+    x = points[int(np.argmin(costs))]
+    others = [min(costs), *at_once(cost, [(edge, x) for edge in edges[1:]])]
+    for edge, c in zip(EDGES, others, strict=True):
+        history.append({"round": "edge", "beyond": edge.beyond * wanted.depth.size, "rim": edge.rim, "cost": number(c)})
+    return edges[int(np.argmin(others))], x
 
 
 def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np.ndarray:

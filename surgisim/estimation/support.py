@@ -1,8 +1,8 @@
-"""What holds the body: how deep the tissue gives way, and whether its rim is attached.
+"""What holds the body: how deep the tissue gives way, how far it goes on beyond the picture, and what holds it there.
 
-A camera sees neither. A load spreads wider over thicker tissue and stops at an attached rim, so the tracks of a pull
-and its hold tell; left out, Poisson's ratio and the modulus are bent to make up for a wrong one. The depth is a number
-of the fit, begun from a few; the rim is one of two.
+A camera sees neither. A load spreads wider over thicker tissue and stops where that ends or is attached, so the tracks
+of a pull and its hold tell; left out, Poisson's ratio and the modulus are bent to make up for a wrong one. The depth is
+a number of the fit, begun from a few; the edge is one of a few.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ import numpy as np
 from surgisim.estimation.lay import Columns
 from surgisim.estimation.unknown import Unknown
 
-SHARES = (1.0, 0.65, 0.4)
+SHARES = (0.7, 0.45, 0.3)
 """Depths the fit may begin from, as shares of the thickened body's."""
 LEAST, MOST = 1.0, 1.2
 """The shallowest depth, in grid cells, and the greatest, as a share of the thickened body's."""
@@ -21,24 +21,33 @@ MIDDLE, SPREAD = 0.5, 0.6
 
 
 @dataclass(frozen=True)
+class Edge:
+    """Where the body ends around what is seen."""
+
+    beyond: float
+    """How far it goes on there, as a share of the depth that is expected [1]."""
+    rim: bool
+    """Whether it is held where it ends."""
+
+
+EDGES = (Edge(0.35, False), Edge(0.35, True), Edge(0.8, False), Edge(0.0, False), Edge(0.0, True))
+"""What is tried, the most expected first: tissue does not end where a picture does."""
+
+
+@dataclass(frozen=True)
 class Support:
-    """One way the body may be held."""
+    """How the body is held."""
 
     depth: float
     """Of the layer that is held, below the surface [m]."""
+    beyond: float
+    """How far the tissue goes on beyond what is seen [m]."""
     rim: bool
-    """Whether the rim is held."""
-
-
-def supports(columns: Columns) -> list[Support]:
-    """The body as it was thickened first, then the others."""
-    rims = (True, False) if columns.rim.any() else (False,)
-    return [Support(share * columns.thickness, rim) for share in SHARES for rim in rims]
+    """Whether it is held where it ends there."""
 
 
 def open_depth(columns: Columns) -> Unknown:
     """The depth at which tissue is held as a number of the fit."""
-    least = LEAST * columns.spacing
     middle = MIDDLE * columns.thickness
-    ends = min(np.log(least / middle), -SPREAD), np.log(MOST / MIDDLE)
-    return Unknown("held.depth", 0.0, SPREAD, *ends, "m", True, middle)
+    low = min(np.log(LEAST * columns.spacing / middle), -SPREAD)
+    return Unknown("held.depth", 0.0, SPREAD, low, np.log(MOST / MIDDLE), "m", True, middle)
