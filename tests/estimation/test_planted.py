@@ -17,7 +17,6 @@ from surgisim.estimation.fit import estimate
 from surgisim.estimation.observation import PHASES, phases
 from surgisim.estimation.rounds import windows
 from surgisim.estimation.search import search
-from surgisim.estimation.support import supports
 from surgisim.mpm.setup import prepare
 from surgisim.physics.place import Place
 from surgisim.problem import Problem
@@ -63,7 +62,7 @@ def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, held=None, seed=0, pl
 
 
 def test_planted_parameters_are_found_from_a_pull_and_its_release():
-    _, physics, fit = estimate(*clip(), Estimation(**QUICK), silent)
+    _, physics, fit, *_ = estimate(*clip(), Estimation(**QUICK), silent)
     E, nu = (physics.terms["corotated"][p]["value"] for p in ("E", "nu"))
     eta = physics.terms["newtonian"]["eta"]["value"]
     assert eta / E == pytest.approx(1.2 / 900.0, rel=0.2)
@@ -77,7 +76,7 @@ def test_planted_parameters_are_found_from_a_pull_and_its_release():
 
 def test_a_pull_without_a_release_cannot_tell_the_modulus():
     slow = pulled(frames=T, hold=T)
-    _, _, fit = estimate(*clip(motion=slow, noise=1e-4), Estimation(**QUICK), silent)
+    _, _, fit, *_ = estimate(*clip(motion=slow, noise=1e-4), Estimation(**QUICK), silent)
     release = fit.identifiability["corotated.E"]["phases"]["release"]
     assert release == 0
     assert not fit.identifiability["corotated.E"]["told"]
@@ -90,7 +89,7 @@ def test_without_a_grip_nothing_is_fitted_and_the_fit_says_so():
     case[3] = type(motion)(
         np.zeros((0, 3)), np.zeros(0), np.zeros((0, T, 3)), np.zeros((0, T), bool), np.zeros(0), "none"
     )
-    _, physics, fit = estimate(*case, Estimation(**QUICK), silent)
+    _, physics, fit, *_ = estimate(*case, Estimation(**QUICK), silent)
     assert physics.terms["corotated"]["E"]["value"] == pytest.approx(3000.0)
     assert "cannot be learned" in fit.words
 
@@ -124,8 +123,8 @@ def test_a_stiff_half_is_found_by_the_refinement():
         return np.where(rest[:, 0] > 0, 2.0, 0.7)
 
     settings = Estimation(**{**QUICK, "field_iterations": 15, "smoothness": 0.3, "field": ["corotated.E"]})
-    material, _, fit = estimate(*clip(stiff=stiff, noise=1e-5), settings, silent)
-    right = slab().rest[:, 0] > 0
+    material, _, fit, _, laid = estimate(*clip(stiff=stiff, noise=1e-5), settings, silent)
+    right = laid.rest[:, 0] > 0
     E = material.values[:, 0]
     assert fit.held_out["field_kept"]
     assert E[right].mean() > 1.15 * E[~right].mean()
@@ -138,7 +137,7 @@ def test_a_lump_whose_place_is_given_tells_how_stiff_it_is():
     given = {law: {"center": place.center, "extent": place.extent} for law, place in places.items()}
     settings = Estimation(**QUICK, terms=list(known), start=known, fixed=fixed, places=given, support=False)
     planted = clip(TRUE | {"stiff_inclusion": {"s": 3.0}}, noise=1e-5, places=places)
-    _, physics, _ = estimate(*planted, settings, silent)
+    _, physics, *_ = estimate(*planted, settings, silent)
     assert physics.terms["stiff_inclusion"]["s"]["value"] == pytest.approx(3.0, rel=0.1)
     assert physics.places["stiff_inclusion"]["extent"] == 0.006
 
@@ -153,7 +152,7 @@ def test_a_path_that_would_turn_the_tissue_inside_out_lets_it_slip_and_says_so()
     case = list(clip())
     wild = pulled(frames=T, hold=9, by=(0.0, 0.0, 0.03))
     case[3] = replace(wild, center_rest=case[3].center_rest)
-    _, physics, fit = estimate(*case, Estimation(**{**QUICK, "iterations": 1, "support": False}), silent)
+    _, physics, fit, *_ = estimate(*case, Estimation(**{**QUICK, "iterations": 1, "support": False}), silent)
     assert physics.grip < 1
     assert fit.held_out["grip"] == physics.grip
     assert "slips" in fit.words
@@ -168,11 +167,27 @@ def test_rounds_double_so_that_their_sum_stays_below_twice_the_clip():
         assert ends[0] >= 14
 
 
-def test_what_holds_the_body_is_chosen_by_the_spread_of_the_pull():
-    choices = supports(slab(), CAMERA)
-    shallow = next(c for c in choices if c.depth < 0.5 * choices[0].depth)
-    _, _, fit = estimate(*clip(held=shallow.held), Estimation(**QUICK), silent)
-    assert fit.held_out["support"]["depth"] == pytest.approx(shallow.depth)
+def test_how_deep_the_body_is_held_is_found_from_the_spread_of_the_pull():
+    shallow = slab().rest[:, 2] > 0.06 + 0.009
+    _, _, fit, _, laid = estimate(*clip(held=shallow), Estimation(**QUICK), silent)
+    depth = fit.identifiability["held.depth"]
+    assert depth["value"] == pytest.approx(0.009, abs=0.002)
+    assert fit.held_out["support"]["depth"] == depth["value"]
+    assert laid.rest[~laid.held, 2].max() < 0.06 + depth["value"]
+
+
+def test_how_far_the_grip_comes_nearer_is_found_where_depth_is_not_measured():
+    case = list(clip(noise=2e-5))
+    tracks, motion = case[2], case[3]
+    flat = np.repeat(motion.position[:, :1, 2], T, 1)
+    seen = CAMERA.lift(CAMERA.project(motion.position), flat)
+    case[2] = replace(tracks, sigma_xyz=tracks.sigma_xyz + np.array([0.0, 0.01], np.float32))
+    case[3] = replace(motion, position=seen)
+    _, _, fit, carried, _ = estimate(*case, Estimation(**QUICK), silent)
+    nearer = fit.identifiability["grip 0.toward"]
+    assert nearer["value"] == pytest.approx(-0.006, rel=0.15)
+    assert nearer["told"]
+    assert carried.position[0, 8, 2] - carried.position[0, 0, 2] == pytest.approx(nearer["value"], rel=0.05)
 
 
 def test_phases_follow_the_grip():
