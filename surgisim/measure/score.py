@@ -6,6 +6,7 @@ from surgisim.measure.groups.depth import depth
 from surgisim.measure.groups.grasp import grasp
 from surgisim.measure.groups.inpainting import inpainting
 from surgisim.measure.groups.masking import masking
+from surgisim.measure.groups.physics import physics
 from surgisim.measure.groups.reconstruction import reconstruction
 from surgisim.measure.groups.replay import replay
 from surgisim.measure.groups.simulation import simulation
@@ -26,6 +27,7 @@ def score(run: Run, *, lpips: Lpips | None, first: int, progress=lambda *_: None
         "reconstruction": lambda: reconstruction(run, lpips, first),
         "simulation": lambda: simulation(run, lpips),
         "replay": lambda: replay(run),
+        "physics": lambda: physics(run),
     }
     groups = {}
     for done, (name, ask) in enumerate(asked.items()):

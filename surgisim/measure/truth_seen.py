@@ -1,6 +1,8 @@
 """The truth of an invented clip, in the pixels the stages worked with."""
 
+import json
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,6 +27,10 @@ class TruthSeen:
     """(K, T) bool."""
     motion: Motion
     """The true grasp [m]."""
+    focal: float
+    """True focal length at the working size [px]."""
+    parameters: dict[str, Any]
+    """What the inventor wrote down: law -> parameter -> value, thickness, timeline, SI units."""
 
 
 def seen(truth: Truth, camera: Camera) -> TruthSeen:
@@ -36,7 +42,8 @@ def seen(truth: Truth, camera: Camera) -> TruthSeen:
         )
     left, top, width, height = camera.crop
     shrink = np.array([camera.width / width, camera.height / height])
-    source = _project(truth)[:, :count]
+    source, focal = _project(truth)
+    source = source[:, :count]
     # Pixel centres are whole numbers, so a resize moves them by half a pixel.
     xy = (source - [left, top] + 0.5) * shrink - 0.5
     motion = Motion(
@@ -50,11 +57,14 @@ def seen(truth: Truth, camera: Camera) -> TruthSeen:
     crop = np.s_[:count, top : top + height, left : left + width]
     tool = _resized(truth.tool[crop].astype(np.uint8), camera) > 0
     depth = _resized(truth.depth[crop], camera)
-    return TruthSeen(tool, depth, xy, truth.xyz[:, :count], truth.visible[:, :count], motion)
+    return TruthSeen(
+        tool, depth, xy, truth.xyz[:, :count], truth.visible[:, :count], motion, focal * shrink[0],
+        json.loads(truth.parameters),
+    )  # fmt: skip
 
 
-def _project(truth: Truth) -> np.ndarray:
-    """Pixels of the true points [source px], (K, T, 2), by the pinhole that explains frame 0."""
+def _project(truth: Truth) -> tuple[np.ndarray, float]:
+    """Pixels of the true points [source px], (K, T, 2), and the focal length, by the pinhole that explains frame 0."""
     ratio = truth.xyz[..., :2].astype(np.float64) / truth.xyz[..., 2:]
     pixels = np.empty(ratio.shape)
     for axis in range(2):
@@ -64,7 +74,7 @@ def _project(truth: Truth) -> np.ndarray:
     worst = float(np.abs(pixels[:, 0] - truth.pixels).max(initial=0))
     if worst > 0.5:
         raise Problem(f"truth: pixels and points disagree by {worst:.2f} px under any pinhole. Make the clip again.")
-    return pixels
+    return pixels, float(focal)
 
 
 def _resized(stack: np.ndarray, camera: Camera) -> np.ndarray:

@@ -104,6 +104,13 @@ def _physics(story: Story) -> Iterator[Doubt]:
             f"{', '.join(edges)} ended at the limit of the range that was searched: more likely making up for a wrong "
             "depth, grip or support than measured.",
         )
+    missed = [
+        f"{name} ({shown(e['low'])} to {shown(e['high'])}, true {shown(e['true'])})"
+        for name, e in story.metrics.values.get("physics", {}).items()
+        if e.get("told") and e.get("inside") is False
+    ]
+    if missed:
+        yield Doubt(True, f"The truth lies outside the 90 % interval of {', '.join(missed)}.")
     if unknown:
         yield Doubt(
             False,

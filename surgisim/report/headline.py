@@ -86,8 +86,17 @@ def _simulation(story: Story) -> list[Card | None]:
             continue
         beside = f"off moving {words}, frames never used; {shown(still)} if nothing moved"
         card = _card(story, "Replay's motion", "simulation", f"{kind}_held_out_moving_px", beside, _mark(value < still))
-        return [card, _fit(story)]
-    return [_fit(story)]
+        return [card, _told(story), _fit(story)]
+    return [_told(story), _fit(story)]
+
+
+def _told(story: Story) -> Card | None:
+    """Whether the intervals hold the truth, where it is known."""
+    share = story.value("physics", "told_inside")
+    return _card(
+        story, "Truth in the intervals", "physics", "told_inside", "share of what the clip is said to tell",
+        _mark(share is not None and share >= 0.8),
+    )  # fmt: skip
 
 
 def _fit(story: Story) -> Card | None:

@@ -30,7 +30,7 @@ def page(story: Story, *, progress=lambda *_: None) -> bytes:
     content["materials"] = material_views(story, (700, 600))
     progress(4, 5, "curves and tables")
     content["plots"] = plots(story)
-    content["parameters"] = parameters(story.run.physics, story.run.fit)
+    content["parameters"] = parameters(story.run.physics, story.run.fit, story.metrics.values.get("physics", {}))
     content["grids"], content["lists"] = grids(story.metrics), lists(story.metrics)
     content["phase_colors"] = PHASE
     text = template("report.html.j2").render(**content)

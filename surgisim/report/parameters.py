@@ -16,15 +16,22 @@ class Parameter:
     unit: str
     told: str
     """yes, no or not said."""
+    true: str
+    """The true value, on an invented clip."""
+    mark: str
+    """good where that is inside the interval, poor where it is not and the number is told, else plain."""
     phases: str
 
 
-def parameters(physics: Physics, fit: Fit) -> list[Parameter]:
-    """Every law's parameters, then the groups that only estimation names."""
+def parameters(physics: Physics, fit: Fit, measured: dict[str, Any]) -> list[Parameter]:
+    """Every law's parameters, then the numbers and groups that only estimation names.
+
+    measured: the metrics' group of the same name, which has the truth and the scale it is told in.
+    """
     rows = {f"{law}.{name}": entry for law, entries in physics.terms.items() for name, entry in entries.items()}
     for name, found in fit.identifiability.items():
         if isinstance(found, dict):
-            rows[name] = rows.get(name, {}) | found
+            rows[name] = rows.get(name, {}) | found | measured.get(name, {})
     return [_parameter(name, entry) for name, entry in rows.items()]
 
 
@@ -38,6 +45,8 @@ def _parameter(name: str, entry: dict[str, Any]) -> Parameter:
         unit="" if entry.get("unit") in (None, "1") else str(entry["unit"]),
         told="not said" if told is None else "yes" if told else "no",
         phases=_phases(entry.get("phases")),
+        true=_text(entry.get("true")) if "true" in entry else "",
+        mark="plain" if "inside" not in entry else "good" if entry["inside"] else "poor" if told else "plain",
     )
 
 

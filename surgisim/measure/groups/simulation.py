@@ -17,6 +17,15 @@ from surgisim.measure.number import number
 from surgisim.measure.phases import phases
 from surgisim.measure.run import Run
 
+STATED = {
+    "default": "frames never fitted, with default parameters",
+    "fitted": "frames never fitted",
+    "after_release_default": "frames never fitted after the release, with default parameters",
+    "after_release_fitted": "frames never fitted after the release",
+    "used_default": "fitted frames, with default parameters",
+    "used_fitted": "fitted frames",
+}
+"""Errors that estimation measured itself, and on which frames."""
 MOVING = 0.25
 """A point counts as moving if it ever goes this share of the liveliest points' way (95th percentile)."""
 
@@ -144,8 +153,9 @@ def _from_start(path: np.ndarray) -> np.ndarray:
 
 def _stated(run: Run) -> dict[str, dict[str, Any]]:
     """What estimation itself measured on frames it never fitted."""
+    said = "stated by estimation: mean distance of moving tracked points, across the view where depth is a guess, on "
     return {
-        f"fit_{name}": number(1e3 * value, run.length_unit, "stated by estimation: track error on frames never fitted")
-        for name, value in run.fit.held_out.items()
-        if isinstance(value, int | float) and not isinstance(value, bool)
+        f"fit_{name}": number(None if value is None else 1e3 * value, run.length_unit, said + where)
+        for name, where in STATED.items()
+        for value in [run.fit.held_out.get(name)]
     }

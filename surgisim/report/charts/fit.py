@@ -32,7 +32,8 @@ def fit(history: list[dict[str, Any]]) -> str | None:
         for k, name in enumerate(names):
             values = np.array([row.get(name, np.nan) for row in steps], float)
             first = values[np.isfinite(values)][0]
-            if first:
+            # What may go through zero has no place on a logarithmic axis.
+            if first and (values[np.isfinite(values)] / first > 0).all():
                 right.plot(at, values / first, "o-", ms=3, color=COLORS[k % len(COLORS)], label=name)
         right.set_ylabel("parameter / its first value [1]")
         right.set_yscale("log")
