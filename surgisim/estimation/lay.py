@@ -91,7 +91,7 @@ def beyond(columns: Columns, margin: float) -> Columns:
     around = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
     known = cKDTree(columns.xy)
     away = known.query(around)[0]
-    around = around[(away > 0.7 * width) & (away <= margin)]
+    around = around[(away > 0.7 * width) & (away <= margin + 0.1 * width)]
     near = known.query(around, k=min(NEIGHBOURS, len(columns.xy)))[1]
     place, z = columns.xy[near], columns.above[near]
     centre = place.mean(1, keepdims=True)

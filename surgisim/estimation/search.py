@@ -71,7 +71,7 @@ class Search:
         return np.maximum(low, self.start - reach), np.minimum(high, self.start + reach)
 
     def starts(self, begin: np.ndarray | None = None) -> list[np.ndarray]:
-        """Points to try first: `begin` (the start if None), stepped in up to two logarithms and the moments of release."""
+        """Points to try first: `begin` (the start if None), two logarithms and the moments of release stepped."""
         low, high = self.bounds
         begin = self.start if begin is None else begin
         steps = [np.zeros(len(begin))]

@@ -8,6 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from surgisim.config.phantom import Phantom
+from surgisim.phantom.block import mesh
+from surgisim.phantom.case import invent
+from surgisim.phantom.elements import elements
+from surgisim.problem import Problem
+
 REST, LOAD, HOLD, AFTER = (0.2, 0.5), (0.4, 0.9), (0.5, 1.1), (0.5, 1.0)
 """How long the tissue rests before the pull, is loaded, held, and seen once let go [s]."""
 RATES = (15.0, 20.0, 25.0, 30.0, 50.0, 60.0)
@@ -16,6 +22,8 @@ FRAMES = 90
 """Most frames of a clip: a faster camera sees a shorter one."""
 WIDTH, HEIGHT = 160, 128
 """Of the pictures [px]."""
+SPACING = 2.8e-3
+"""Edge of the finite elements [m]."""
 CLOSED = 0.04
 """The jaws are closed so long before the pull begins [s]."""
 
@@ -30,7 +38,6 @@ def draw(seed: int, n: int) -> dict[str, Any]:
     camera, told = _camera(_generator(seed, n, "camera"))
     fps, times = _times(_generator(seed, n, "times"))
     phantom = {
-        "seed": int(_generator(seed, n, "phantom").integers(1, 2**31)),
         "width": WIDTH,
         "height": HEIGHT,
         "fps": fps,
@@ -40,7 +47,23 @@ def draw(seed: int, n: int) -> dict[str, Any]:
         **times,
         **_picture(_generator(seed, n, "picture")),
     }
-    return {"phantom": phantom, "ingest": {"focal": phantom["focal"] * WIDTH if told else None}}
+    seeds = _generator(seed, n, "phantom")
+    while True:
+        phantom["seed"] = int(seeds.integers(1, 2**31))
+        if _meshed(Phantom(**phantom)):
+            break
+    return {"phantom": phantom | {"spacing": SPACING}, "ingest": {"focal": phantom["focal"] * WIDTH if told else None}}
+
+
+def _meshed(settings: Phantom) -> bool:
+    """Whether finite elements fit relief and grip: not every pair can be meshed, and another seed has another."""
+    case = invent(settings)
+    try:
+        block = mesh(case.shape, case.grip, SPACING, hold_sides=settings.sides == "held")
+        elements(block.points, block.cells, case.law)
+    except Problem:
+        return False
+    return True
 
 
 def _generator(seed: int, n: int, part: str) -> np.random.Generator:
@@ -67,7 +90,7 @@ def _times(rng: np.random.Generator) -> tuple[float, dict[str, float]]:
 
 
 def _tissue(rng: np.random.Generator) -> dict[str, Any]:
-    """E of .3 to 5 kPa, nu of .40 to .48, eta / E of 1 to 8 ms; 8 to 24 mm thick, its sides free or held."""
+    """E of .3 to 5 kPa, nu of .40 to .48, eta / E of 1 to 8 ms; 10 to 24 mm thick, its sides free or held."""
     while True:
         E, lag = 300 * math.exp(rng.uniform(0, math.log(5000 / 300))), 1e-3 * math.exp(rng.uniform(0, math.log(8)))
         if E * lag < 12.0:
@@ -76,7 +99,7 @@ def _tissue(rng: np.random.Generator) -> dict[str, Any]:
         "E": E,
         "nu": rng.uniform(0.40, 0.48),
         "eta": E * lag,
-        "thickness": rng.uniform(0.008, 0.024),
+        "thickness": rng.uniform(0.010, 0.024),
         "relief": rng.uniform(0.5e-3, 2.5e-3),
         "sides": str(rng.choice(["free", "held"])),
     }

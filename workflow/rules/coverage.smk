@@ -20,8 +20,8 @@ rule coverage:
     resources:
         mem_mb=2000,
     params:
-        code=lambda w: _code("coverage"),
+        code=lambda w: _code("interval_coverage"),
     shell:
-        'python "$SURGISIM/stages/coverage.py"'
+        'python "$SURGISIM/stages/interval_coverage.py"'
         " --metrics {input.metrics}"
         " --table {output.table} --picture {output.picture} --code {params.code} 2> {log}"

@@ -4,6 +4,7 @@ import io
 from typing import Any
 
 import matplotlib
+import matplotlib.pyplot as plt
 
 from surgisim.report.palette import INK, MUTED, RECONSTRUCTION, REPLAY
 
@@ -13,10 +14,9 @@ matplotlib.use("Agg")
 def intervals(result: dict[str, Any]) -> bytes:
     """PNG: a panel a parameter, a line a clip from the low to the high end; 1 is the truth.
 
-    result: as `surgisim.measure.coverage.coverage` gives it. Told and inside are blue, told and outside orange, untold grey.
+    result: as `surgisim.measure.coverage.coverage` gives it. Told and inside are blue, told and outside orange, the
+    untold grey.
     """
-    import matplotlib.pyplot as plt
-
     parameters = result["parameters"]
     count = max(len(parameters), 1)
     across = min(count, 4)
