@@ -42,13 +42,13 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "held_of_all": _share([r["inside"] for r in rows]),
         "told": _share([r["told"] for r in rows]),
         "bias": _spread([_relative(r, r["value"] - r["true"]) for r in told]),
-        "width": _spread([_relative(r, r["high"] - r["low"]) for r in told]),
+        "width": _spread([abs(_relative(r, r["high"] - r["low"])) for r in told]),
     }
 
 
 def _relative(row: dict[str, Any], difference: float) -> float:
     """A difference as a share of the truth."""
-    return difference / abs(row["true"]) if row["true"] else float("nan")
+    return difference / row["true"] if row["true"] else float("nan")
 
 
 def _share(hits: list[bool]) -> dict[str, Any]:

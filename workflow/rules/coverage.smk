@@ -3,6 +3,11 @@
 
 rule coverage:
     input:
+        "results/coverage.json",
+
+
+rule interval_coverage:
+    input:
         metrics=expand(
             "results/{clip}/{variant}/evaluation/metrics.json",
             clip=PLAN.clips,
@@ -12,9 +17,9 @@ rule coverage:
         table="results/coverage.json",
         picture="results/coverage.png",
     log:
-        "logs/coverage.log",
+        "logs/interval_coverage.log",
     benchmark:
-        "benchmarks/coverage.tsv"
+        "benchmarks/interval_coverage.tsv"
     conda:
         "../../envs/report.yaml"
     resources:

@@ -30,7 +30,7 @@ def intervals(result: dict[str, Any]) -> bytes:
     for panel, (name, summary) in zip(panels.ravel(), parameters.items(), strict=False):
         rows = sorted(result["rows"][name], key=lambda r: r["value"] / r["true"] if r["true"] else 0.0)
         for k, row in enumerate(rows):
-            size = abs(row["true"]) or 1.0
+            size = row["true"] or 1.0
             ends = [(row[key] - row["true"]) / size + 1 for key in ("low", "value", "high")]
             color = MUTED if not row["told"] else RECONSTRUCTION if row["inside"] else REPLAY
             panel.plot([ends[0], ends[2]], [k, k], color=color, lw=2, solid_capstyle="butt")
