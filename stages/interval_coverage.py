@@ -17,7 +17,7 @@ from surgisim.stage import Bytes, Several, stage
 def main(metrics, *, settings, progress):
     import json
 
-    from surgisim.measure.coverage import coverage, in_words
+    from surgisim.proof.coverage import coverage, in_words
     from surgisim.report.charts.intervals import intervals
 
     result = coverage(metrics)

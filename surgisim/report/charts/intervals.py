@@ -14,7 +14,7 @@ matplotlib.use("Agg")
 def intervals(result: dict[str, Any]) -> bytes:
     """PNG: a panel a parameter, a line a clip from the low to the high end; 1 is the truth.
 
-    result: as `surgisim.measure.coverage.coverage` gives it. Told and inside are blue, told and outside orange, the
+    result: as `surgisim.proof.coverage.coverage` gives it. Told and inside are blue, told and outside orange, the
     untold grey.
     """
     parameters = result["parameters"]

@@ -1,7 +1,7 @@
 """Coverage counts what it should."""
 
 from surgisim.artifacts.metrics import Metrics
-from surgisim.measure.coverage import coverage, in_words, plain
+from surgisim.proof.coverage import coverage, in_words, plain
 from surgisim.report.charts.intervals import intervals
 
 
@@ -18,7 +18,7 @@ def test_only_what_is_told_counts_for_the_share_inside():
     assert (E["held"]["hits"], E["held"]["count"]) == (2, 3)
     assert (E["told"]["hits"], E["told"]["count"]) == (3, 4)
     assert E["held_of_all"]["count"] == 4
-    assert E["bias"]["median"] == (4.5 + 1 - 5) / 5
+    assert E["bias"]["value"] == (4.5 + 1 - 5) / 5
     assert "inside 2/3" in in_words(result)
     assert intervals(result).startswith(b"\x89PNG")
 

@@ -4,10 +4,8 @@ from collections import defaultdict
 from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
-from scipy.stats import binomtest
-
 from surgisim.artifacts.metrics import Metrics
+from surgisim.proof.shares import median, share
 
 
 def coverage(clips: Iterable[Metrics]) -> dict[str, Any]:
@@ -38,34 +36,23 @@ def _of(entry: dict[str, Any]) -> dict[str, Any]:
 def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     told = [r for r in rows if r["told"]]
     return {
-        "held": _share([r["inside"] for r in told]),
-        "held_of_all": _share([r["inside"] for r in rows]),
-        "told": _share([r["told"] for r in rows]),
-        "bias": _spread([_relative(r, r["value"] - r["true"]) for r in told]),
-        "width": _spread([abs(_relative(r, r["high"] - r["low"])) for r in told]),
+        "held": share(r["inside"] for r in told).told(),
+        "held_of_all": share(r["inside"] for r in rows).told(),
+        "told": share(r["told"] for r in rows).told(),
+        "bias": median(_relative(r, r["value"] - r["true"]) for r in told),
+        "width": median(_width(r) for r in told),
     }
 
 
-def _relative(row: dict[str, Any], difference: float) -> float:
-    """A difference as a share of the truth."""
-    return difference / row["true"] if row["true"] else float("nan")
+def _relative(row: dict[str, Any], difference: float) -> float | None:
+    """A difference as a share of the truth; None where that is nothing."""
+    return difference / row["true"] if row["true"] else None
 
 
-def _share(hits: list[bool]) -> dict[str, Any]:
-    """A share with its 95 % interval after Wilson."""
-    if not hits:
-        return {"hits": 0, "count": 0, "value": None, "low": 0.0, "high": 1.0}
-    ends = binomtest(sum(hits), len(hits)).proportion_ci(method="wilson")
-    return {"hits": sum(hits), "count": len(hits), "value": float(np.mean(hits)), "low": ends.low, "high": ends.high}
-
-
-def _spread(values: list[float]) -> dict[str, Any]:
-    """Median and quartiles of what is finite."""
-    kept = [v for v in values if np.isfinite(v)]
-    if not kept:
-        return {"count": 0, "median": None, "low": None, "high": None}
-    low, median, high = np.percentile(kept, [25, 50, 75]).tolist()
-    return {"count": len(kept), "median": median, "low": low, "high": high}
+def _width(row: dict[str, Any]) -> float | None:
+    """How wide an interval is, as a share of the truth."""
+    wide = _relative(row, row["high"] - row["low"])
+    return None if wide is None else abs(wide)
 
 
 def in_words(result: dict[str, Any]) -> str:
@@ -75,7 +62,7 @@ def in_words(result: dict[str, Any]) -> str:
         held, told = s["held"], s["told"]
         text = f"  {name:18s} inside {held['hits']}/{held['count']} [{held['low']:.0%}-{held['high']:.0%}]"
         text += f", told {told['hits']}/{told['count']}"
-        if s["bias"]["median"] is not None:
-            text += f", median off by {s['bias']['median']:+.0%}, interval {s['width']['median']:.0%} wide"
+        if s["bias"]["value"] is not None:
+            text += f", median off by {s['bias']['value']:+.0%}, interval {s['width']['value']:.0%} wide"
         lines.append(text)
     return "\n".join(lines)
