@@ -18,7 +18,7 @@ from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.observation import observe, phases
-from surgisim.estimation.rounds import search_softly
+from surgisim.estimation.rounds import choose_start, descend
 from surgisim.estimation.search import search
 from surgisim.estimation.trial import Trial
 from surgisim.mpm.setup import prepare
@@ -56,7 +56,8 @@ def fit(frames: int) -> dict:
         bodies, wanted, motion, observation, body.held, FPS, frames, np.arange(1, frames), 1.0, ledger=ledger
     )
     settings, begun = Estimation(first_window=0.25, field_iterations=0), time.process_time()
-    _, solution = search_softly(trial, phases(motion, frames), settings, [], lambda *_: None)
+    begin = choose_start(trial, wanted.start, [], lambda *_: None)
+    _, solution = descend(trial, begin, phases(motion, frames), settings, [], lambda *_: None)
     seconds = time.process_time() - begun
     found = wanted.values(solution.x)
     return {
@@ -77,10 +78,10 @@ class _Counted(Trial):
         super().__init__(*args)
         object.__setattr__(self, "ledger", ledger)
 
-    def run(self, x, worker=0, last=None):
-        out = super().run(x, worker, last)
-        self.ledger.append(len(out.u) - 1)
-        return out
+    def _run(self, x, worker, last):
+        run, observation = super()._run(x, worker, last)
+        self.ledger.append(len(run.u) - 1)
+        return run, observation
 
 
 def _slab() -> Body:
