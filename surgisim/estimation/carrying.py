@@ -87,7 +87,7 @@ def carrying(motion: Motion, tracks: Tracks, camera: Camera, measured: bool) -> 
             unknowns.append(Unknown(named(j, "release"), RELEASE, RELEASE_SPREAD, *RELEASE_ENDS, "frames"))
     if not measured:
         motion = replace(motion, position=_level(motion, camera))
-    return Carrying(motion, camera, _share(tracks, motion), tuple(unknowns))
+    return Carrying(motion, camera, course(tracks, motion), tuple(unknowns))
 
 
 def _level(motion: Motion, camera: Camera) -> np.ndarray:
@@ -97,7 +97,7 @@ def _level(motion: Motion, camera: Camera) -> np.ndarray:
     )
 
 
-def _share(tracks: Tracks, motion: Motion) -> np.ndarray:
+def course(tracks: Tracks, motion: Motion) -> np.ndarray:
     """How far the pull has gone, from what moves with it: what each frame has of the farthest one's motion, (T,)."""
     held = motion.active.any(0)
     moved = np.where(tracks.visible[..., None], tracks.xy - tracks.xy[:, :1], 0.0).astype(float)

@@ -1,7 +1,8 @@
 """The whole estimation: support and start, rounds, a field where it pays, then what is known."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,18 +18,29 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
-from surgisim.estimation.carrying import carrying
+from surgisim.estimation.carrying import carrying, course
 from surgisim.estimation.damping import numerical_damping
+from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.lay import Laying, upright
+from surgisim.estimation.model_error import model_error
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
+from surgisim.estimation.otherwise import Answer, Otherwise, answers, better, otherwise, rivals, shares
 from surgisim.estimation.picture import picture_loss
 from surgisim.estimation.refine import Refined, refine
-from surgisim.estimation.rounds import INDEPENDENT, choose_start, choose_support, descend, number, settle_grip
+from surgisim.estimation.rounds import (
+    INDEPENDENT,
+    choose_start,
+    choose_support,
+    descend,
+    number,
+    settle_grip,
+    windows,
+)  # fmt: skip
 from surgisim.estimation.search import Search, search
 from surgisim.estimation.support import EDGES, Support, open_depth
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
-from surgisim.mpm.setup import Prepared, Values, prepare
+from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
 from surgisim.physics.catalogue import choose, columns
 from surgisim.physics.place import Place
 from surgisim.problem import Problem
@@ -83,10 +95,12 @@ def estimate(
     tracked = tracks.xyz[:, 0][np.isfinite(tracks.xyz[:, 0]).all(1)]
     carried = np.concatenate([scene.mean, tracked]).astype(float)
 
-    def make(body: Body, motion: Motion) -> Prepared:
+    def make(
+        body: Body, motion: Motion, terms: tuple[str, ...] = tuple(settings.terms), carried: np.ndarray = carried
+    ) -> Prepared:
         return prepare(
-            body, tuple(settings.terms), density=settings.density, gravity=settings.gravity, carried=carried,
-            device=settings.device, form=settings.form, places=places, grips=motion,
+            body, terms, density=settings.density, gravity=settings.gravity, carried=carried,
+            device=settings.device, form=settings.form, places=places, grips=motion, skin=SKIN,
         )  # fmt: skip
 
     reason = _nothing_to_learn(motion, tracks, body)
@@ -107,6 +121,7 @@ def estimate(
         "fitted_frames": fitted,
     }
     x, history, table = trial.wanted.start, [], {}
+    progress = _onward(progress)
     trial, run = settle_grip(trial, x, history)
     before = {name: trial.stand(x)[0].observation.error(run.u, at) for name, at in parts.items()}
     if trial.laying:
@@ -114,12 +129,17 @@ def estimate(
         trial, _ = settle_grip(trial, x, history)
     if settings.enabled and wanted.free:
         x = choose_start(trial, x, history, progress)
-        trial, solution = descend(trial, x, phase, settings, history, progress)
+        ends = windows(fitted, phase, settings.first_window)
+        trial, solution = descend(trial, x, ends, settings, history, progress)
+        model = {}
+        if trial.laying:
+            ask = partial(otherwise, camera=camera, points=carried, make=make)
+            trial, solution, model = _weighed(trial, solution, ask, ends[-1:], settings, history, progress)
         x = solution.x
         phase_of = np.broadcast_to(phase[fitted][None, :, None], (len(observation.rest), len(fitted), 3)).ravel()
         table = identifiability(
             solution, trial.wanted, phase_of=phase_of, phase_names=PHASES, density=settings.density,
-            length=trial.depth(x), independent=INDEPENDENT,
+            length=trial.depth(x), independent=INDEPENDENT, model=model,
         )  # fmt: skip
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
     support = Support(trial.depth(x), *edge)
@@ -175,12 +195,63 @@ def _opened(
     if settings.carrying:
         measured = bool((trial.observation.weight[..., 2] > 0).any())
         wanted = replace(wanted, carrying=carrying(motion, tracks, camera, measured))
+    trial = replace(trial, error=model_error(trial.observation, course(tracks, motion), INDEPENDENT))
     laid = upright(body, camera) if settings.support and settings.form == "total" else None
     if laid is None:
         return replace(trial, wanted=wanted)
     depth = open_depth(laid)
     laying = Laying(laid, EDGES[0].beyond * depth.size, EDGES[0].rim, trial.observation, make)
     return replace(trial, wanted=replace(wanted, depth=depth), laying=laying)
+
+
+def _weighed(
+    trial: Trial,
+    solution: Solution,
+    ask: Callable[[Trial], Iterator[Otherwise]],
+    ends: list[int],
+    settings: Estimation,
+    history: list,
+    progress: Say,
+) -> tuple[Trial, Solution, dict[str, np.ndarray]]:
+    """The fit held against its rivals, going on from a far more probable one, and against what it takes for granted.
+
+    The last of it is the covariance that each adds to the numbers in search space, by its name.
+    """
+    first, wanted = trial, trial.wanted
+    found = answers(solution, wanted, list(rivals(trial, solution.x)), _part(progress, 0.55, 0.63))
+    chosen = better(solution, wanted, found)
+    if chosen:
+        begun = Answer(Otherwise("as first found", first, rival=True), solution.x, None, found[0].cost)
+        found = [a for a in found if a not in (chosen, found[0])] + [begun] * (chosen is not found[0])
+        trial, solution = descend(chosen.one.trial, chosen.x, ends, settings, history, progress)
+    else:
+        found = found[1:]
+    here, *others = answers(solution, wanted, list(ask(trial)), _part(progress, 0.63, 0.7))
+    if here.residual is not None:
+        solution = Solution(here.x, here.residual, solution.jacobian)
+    found += others
+    table = list(zip(found, shares(solution, wanted, found), strict=True))
+    for a, share in table:
+        history.append({"round": "otherwise", "about": a.one.about, "share": share, "misfit": number(a.cost)})
+    shifts = {a.one.about: (a.x - solution.x, share) for a, share in table}
+    return trial, solution, {about: share * np.outer(d, d) for about, (d, share) in shifts.items()}
+
+
+def _part(progress: Say, begin: float, end: float) -> Say:
+    """Progress of a piece of the whole."""
+    return lambda done, of, text: progress(begin + (end - begin) * done / of, 1.0, text)
+
+
+def _onward(progress: Say) -> Say:
+    """The same, never backwards."""
+    farthest = 0.0
+
+    def say(done: float, of: float, text: str) -> None:
+        nonlocal farthest
+        farthest = max(farthest, done / of)
+        progress(farthest, 1.0, text)
+
+    return say
 
 
 def _nothing_to_learn(motion: Motion, tracks: Tracks, body: Body) -> str:

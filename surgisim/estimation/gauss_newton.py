@@ -10,6 +10,10 @@ from surgisim.mpm.simulator import Breakdown
 
 DIFFERENCE = 0.02
 """Step of the forward differences in search space: well above float32 noise, well below curvature."""
+NARROW = 0.3
+"""The same, at most, as a share of a number's prior deviation."""
+RENEWED = 0.05
+"""Share of the cost a step must win, or the derivative is taken anew."""
 WIDTH = 2.0
 """Standard deviations beyond which a residual counts linearly: a lost track must not bend a modulus."""
 
@@ -46,7 +50,8 @@ def gauss_newton(
     residual(x, worker) may be called from `workers` threads at once, each with its own number; it
     returns None where x cannot be simulated, which only a trial step may meet. together(xs) gives the residuals of
     several x at once, where that is quicker.
-    Nocedal and Wright, Numerical optimization, 2nd ed. (2006), section 10.3.
+    Nocedal and Wright, Numerical optimization, 2nd ed. (2006), section 10.3; between derivatives by differences, which
+    cost a simulation a number, Broyden's update (ibid., section 11.1).
     """
     low, high = bounds
     damping = 1e-2
@@ -54,8 +59,10 @@ def gauss_newton(
     def all_of(xs: list[np.ndarray]) -> list[np.ndarray | None]:
         return together(xs) if together else at_once(residual, xs, workers)
 
+    step = np.minimum(DIFFERENCE, NARROW * spread)
+
     def jacobian_at(x: np.ndarray, r: np.ndarray) -> np.ndarray:
-        side = np.where(x + DIFFERENCE <= high, 1.0, -1.0) * DIFFERENCE
+        side = np.where(x + step <= high, 1.0, -1.0) * step
         shifted = all_of([x + side[m] * np.eye(len(x))[m] for m in range(len(x))])
         for m in [m for m, s in enumerate(shifted) if s is None]:
             side[m] = -side[m]
@@ -76,30 +83,39 @@ def gauss_newton(
             "estimation: the simulation breaks down at its start values. "
             "Start from stiffer tissue (estimation.start), or check the grip."
         )
-    cost, J = cost_of(r, x), jacobian_at(x, r)
+    cost, J, fresh = cost_of(r, x), jacobian_at(x, r), True
     said(0, x, cost)
     for iteration in range(1, iterations + 1):
-        w = share / np.maximum(1.0, np.abs(r) / WIDTH)
-        H = (J * w[:, None]).T @ J + np.diag(1 / spread**2)
-        g = (J * w[:, None]).T @ r + (x - prior) / spread**2
         best = None
-        for pair in ((0.1, 1.0), (10.0, 100.0)):
-            trials = [np.clip(x - np.linalg.solve(H + f * damping * np.diag(np.diag(H)), g), low, high) for f in pair]
-            results = all_of(trials)
-            costs = [cost_of(q, t) for q, t in zip(results, trials, strict=True)]
-            k = int(np.argmin(costs))
-            if costs[k] < cost:
-                best = (trials[k], results[k], costs[k], pair[k] * damping)
-                break
-        if best is None:
-            break
-        moved, gained = np.abs(best[0] - x).max(), (cost - best[2]) / max(cost, 1e-30)
+        while best is None:
+            w = share / np.maximum(1.0, np.abs(r) / WIDTH)
+            H = (J * w[:, None]).T @ J + np.diag(1 / spread**2)
+            g = (J * w[:, None]).T @ r + (x - prior) / spread**2
+            for pair in ((0.1, 1.0), (10.0, 100.0)):
+                trials = [
+                    np.clip(x - np.linalg.solve(H + f * damping * np.diag(np.diag(H)), g), low, high) for f in pair
+                ]
+                results = all_of(trials)
+                costs = [cost_of(q, t) for q, t in zip(results, trials, strict=True)]
+                k = int(np.argmin(costs))
+                if costs[k] < cost:
+                    best = (trials[k], results[k], costs[k], pair[k] * damping)
+                    break
+            if best is None and fresh:
+                return Solution(x, r, J)
+            if best is None:
+                J, fresh = jacobian_at(x, r), True
+        moved, gained = best[0] - x, (cost - best[2]) / max(cost, 1e-30)
+        # Broyden's update: a derivative that agrees with the step just made costs no further simulations.
+        J = J + np.outer((best[1] - r - J @ moved) / (moved @ moved), moved)
         x, r, cost, damping = best[0], best[1], best[2], max(best[3], 1e-6)
-        J = jacobian_at(x, r)
         said(iteration, x, cost)
-        if moved < 5e-3 or gained < 3e-4:
+        small = np.abs(moved).max() < 5e-3 or gained < 3e-4
+        done = small and fresh
+        J, fresh = (jacobian_at(x, r), True) if small or gained < RENEWED else (J, False)
+        if done:
             break
-    return Solution(x, r, J)
+    return Solution(x, r, J if fresh else jacobian_at(x, r))
 
 
 def misfit(r: np.ndarray) -> float:

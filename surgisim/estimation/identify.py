@@ -1,5 +1,7 @@
 """What a clip can tell: intervals of parameters and of dimensionless groups, and who informs them."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from surgisim.estimation.gauss_newton import Solution
@@ -8,6 +10,8 @@ from surgisim.estimation.support import Support
 
 OPEN_TOLD = 0.5
 """The same of what is open beside the laws, whose priors are narrow."""
+RESTS = 0.2
+"""Share of a quantity's variance from which on what was taken for granted is named."""
 TOLD = 0.1
 """A number counts as told by the clip when its posterior spread is at most this share of the prior's: a modulus to
 about 25 % either way (90 %), Poisson's ratio to about .02."""
@@ -22,20 +26,19 @@ def identifiability(
     density: float,
     length: float,
     independent: float,
-    model: np.ndarray | None = None,
+    model: Mapping[str, np.ndarray] | None = None,
 ) -> dict:
     """Parameters and groups with 90 % intervals, the share of information from each phase, and whether told.
 
     phase_of: phase of every residual, (R,). length: thickness of the body [m].
     independent: share of the residuals that count as independent, because tracking noise is
     correlated along a track and between neighbours; the misfit's own size scales the noise.
-    model: covariance of the error that the simulation itself makes in the parameters, in search space, (M, M).
+    model: for what was taken for granted, by its name, what it adds to the parameters' covariance in search space,
+    (M, M). Whatever has a fifth of a quantity's variance is named in its `rests_on`, with its share.
     """
-    J, r, spread = solution.jacobian, solution.residual, search.spread
-    used = r != 0
-    scale = max(1.0, float(np.mean(r[used] ** 2))) if used.any() else 1.0
-    information = independent / scale * (J.T @ J)
-    covariance = np.linalg.inv(information + np.diag(1 / spread**2)) + (0.0 if model is None else model)
+    J, r, spread, model = solution.jacobian, solution.residual, search.spread, model or {}
+    information = independent / spread_of(r) * (J.T @ J)
+    covariance = np.linalg.inv(information + np.diag(1 / spread**2)) + sum(model.values())
     result = {}
     for name, direction, value, unit, logarithmic, size in _quantities(search, solution.x, density, length):
         sd = float(np.sqrt(direction @ covariance @ direction))
@@ -59,9 +62,18 @@ def identifiability(
             "unit": unit,
             "told": bool(told),
             "at_edge": edge,
+            "rests_on": {
+                n: round(share, 3) for n, c in model.items() if (share := direction @ c @ direction / sd**2) > RESTS
+            },
             "phases": {n: round(v / total, 3) if total > 0 else 0.0 for n, v in by_phase.items()},
         }
     return result
+
+
+def spread_of(r: np.ndarray) -> float:
+    """Mean square of weighted residuals, 1 at least: how many times larger their variance is than was stated."""
+    used = r != 0
+    return max(1.0, float(np.mean(r[used] ** 2))) if used.any() else 1.0
 
 
 def _at_edge(search: Search, x: np.ndarray, direction: np.ndarray) -> bool:

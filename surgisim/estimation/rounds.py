@@ -28,6 +28,8 @@ NEARER = (0.0, -0.7, -1.4)
 """How far the grip comes nearer there, in spreads of its prior."""
 GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
 """How firmly instruments may hold, tried in turn."""
+OPENED = 4
+"""How many of the best starts are tried with other moments of release."""
 SETTLED = 4
 """Frames after a release that the first window must hold, or it says nothing of modulus and viscosity."""
 
@@ -103,12 +105,18 @@ def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np
     A ring-down misfits by whole periods: from a modulus a few times too high, a descent ends there.
     """
     wanted, points = trial.wanted, trial.wanted.starts(begin)
+
+    def costs_of(points: list[np.ndarray]) -> list[float]:
+        return [
+            np.inf if r is None else INDEPENDENT * misfit(r) + float((((x - wanted.start) / wanted.spread) ** 2).sum())
+            for r, x in zip(trial.together(points), points, strict=True)
+        ]
+
     say(0.1, 1.0, f"trying {len(points)} starts")
-    results = trial.together(points)
-    costs = [
-        np.inf if r is None else INDEPENDENT * misfit(r) + float((((x - wanted.start) / wanted.spread) ** 2).sum())
-        for r, x in zip(results, points, strict=True)
-    ]
+    costs = costs_of(points)
+    more = [y for k in np.argsort(costs, kind="stable")[:OPENED] for y in wanted.openings(points[k])]
+    say(0.18, 1.0, f"trying {len(more)} moments of release")
+    points, costs = points + more, costs + costs_of(more)
     for x, cost in zip(points, costs, strict=True):
         history.append({"round": "start", "cost": number(cost)} | plain(wanted, x))
     if not np.isfinite(costs).any():
@@ -120,10 +128,13 @@ def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np
 
 
 def descend(
-    trial: Trial, x: np.ndarray, phase: np.ndarray, settings: Estimation, history: list, say: Say
+    trial: Trial, x: np.ndarray, ends: list[int], settings: Estimation, history: list, say: Say
 ) -> tuple[Trial, Solution]:
-    """Gauss-Newton over growing windows from x, with a softer grip from where on a firmer one cannot be simulated."""
-    wanted, ends = trial.wanted, windows(trial.fitted, phase, settings.first_window)
+    """Gauss-Newton from x over windows that end at these frames, the last at the last fitted one.
+
+    Where a firmer grip cannot be simulated, a softer one holds from there on.
+    """
+    wanted = trial.wanted
     for k, last in enumerate(ends):
         # What fits a window may turn the tissue inside out in the next.
         while trial.residual(x, last=last) is None:
@@ -136,7 +147,7 @@ def descend(
                 x = now
                 values = {n: float(f"{v:.4g}") for n, v in plain(wanted, x).items()}
                 history.append({"round": k, "last_frame": int(last), "iteration": iteration, "cost": cost} | values)
-                done = 0.25 + 0.45 * (k + iteration / settings.iterations) / len(ends)
+                done = 0.25 + 0.3 * (k + iteration / settings.iterations) / len(ends)
                 say(done, 1.0, f"round {k + 1}/{len(ends)}, iteration {iteration}: {values}")
 
             try:

@@ -17,7 +17,7 @@ REACH = 2.0
 """How many prior deviations from its start a logarithm may go."""
 FIRST_STEPS, SECOND_STEPS = (-2.4, -1.6, -0.8, 0.0, 0.8), (-1.2, 0.0, 1.2)
 """Offsets of the first two logarithms in the scan that precedes the descent."""
-OPENING_STEPS = (-0.5, 0.0, 0.5)
+OPENING_STEPS = (-0.5, 0.5)
 """The same of the moments of release [frames]."""
 PRIOR_SHARE = 0.3
 """The same for a plain parameter, as a share of its range."""
@@ -70,19 +70,21 @@ class Search:
         reach = np.where(logarithmic, REACH * self.spread, np.inf)
         return np.maximum(low, self.start - reach), np.minimum(high, self.start + reach)
 
-    def starts(self, begin: np.ndarray | None = None) -> list[np.ndarray]:
-        """Points to try first: `begin` (the start if None), two logarithms and the moments of release stepped."""
-        low, high = self.bounds
-        begin = self.start if begin is None else begin
+    def starts(self, begin: np.ndarray) -> list[np.ndarray]:
+        """Points to try first: `begin` with its first two logarithms stepped."""
         steps = [np.zeros(len(begin))]
         logarithmic = [k for k, (*_, p) in enumerate(self.free) if p.logarithmic]
         for k, offsets in zip(logarithmic, (FIRST_STEPS, SECOND_STEPS), strict=False):
             steps = [s + o * np.eye(len(begin))[k] for s in steps for o in offsets]
-        opens = [k for k, name in enumerate(self.names) if name.endswith(".release")]
-        if opens:
-            # Soft tissue let go early and stiff tissue let go late are two valleys, and no descent crosses between.
-            steps = [s + o * np.isin(np.arange(len(begin)), opens) for s in steps for o in OPENING_STEPS]
-        return [np.clip(begin + s, low, high) for s in steps]
+        return [np.clip(begin + s, *self.bounds) for s in steps]
+
+    def openings(self, begin: np.ndarray) -> list[np.ndarray]:
+        """`begin` with the moments of release stepped; none where nothing is let go.
+
+        Soft tissue let go early and stiff tissue let go late are two valleys, and no descent crosses between.
+        """
+        opens = np.array([name.endswith(".release") for name in self.names])
+        return [np.clip(begin + o * opens, *self.bounds) for o in OPENING_STEPS] if opens.any() else []
 
     def values(self, x: np.ndarray) -> Values:
         """Law -> parameter -> value at x."""

@@ -11,12 +11,14 @@ import numpy as np
 
 from surgisim.artifacts.motion import Motion
 from surgisim.estimation.lay import Laying
+from surgisim.estimation.model_error import ModelError
 from surgisim.estimation.observation import Observation
 from surgisim.estimation.search import Search
 from surgisim.mpm.batch import Batch
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Breakdown, Run
+from surgisim.physics.catalogue import choose
 
 WORKERS = 2
 SAFETY = 0.9
@@ -43,6 +45,8 @@ class Trial:
     """Whether the boundary is known to hold there, see Prepared.drive."""
     laying: Laying | None = None
     """Where bodies come from that are laid anew as the search goes; none where `bodies` stay."""
+    error: ModelError | None = None
+    """What the simulation gets wrong although its numbers are right."""
 
     def stand(self, x: np.ndarray, worker: int = 0) -> tuple["Trial", Motion]:
         """This trial with the body that x asks for, and how that is carried."""
@@ -98,13 +102,29 @@ class Trial:
             run, observation = self._run(x, worker, last)
         except Breakdown:
             return None
-        return observation.residual(run.u, self.fitted[self.fitted <= last]).ravel()
+        return self._apart(run, observation, last)
+
+    def _apart(self, run: Run, observation: Observation, last: int) -> np.ndarray:
+        frames = self.fitted[self.fitted <= last]
+        r = observation.residual(run.u, frames)
+        return (self.error.whiten(r, frames) if self.error else r).ravel()
 
     def _run(self, x: np.ndarray, worker: int, last: int | None) -> tuple[Run, Observation]:
         values = self.wanted.values(x)
         here, motion = self.stand(x, worker)
         drive = here.drive(values, motion=motion)
-        return here.bodies[worker].simulator.run(here.theta(values), drive, last=last), here.observation
+        first = min(self.quiet, last or self.quiet)
+        run = here.bodies[worker].simulator.run(here.theta(values), drive, first=first, last=last)
+        return run.after(first), here.observation
+
+    @cached_property
+    def quiet(self) -> int:
+        """The frame up to which nothing moves a body that is laid for a search."""
+        laws = choose(self.bodies[0].terms).values()
+        calm = all(t.force is None and t.flow is None and t.drive is None and not t.wide for t in laws)
+        if self.laying is None or not calm or any(self.bodies[0].simulator.gravity):
+            return 0
+        return max(0, int(np.argmax(self.motion.active.any(0))) - 1)
 
     def together(self, points: list[np.ndarray], last: int | None = None) -> list[np.ndarray | None]:
         """`residual` at several x: side by side in one run on a GPU, on two threads on a CPU."""
@@ -117,10 +137,7 @@ class Trial:
         motions = [self.wanted.motion(x, self.motion) for x in points]
         drives = [self.drive(v, per_frame=most, motion=m) for v, m in zip(values, motions, strict=True)]
         runs = self.batch.run([self.theta(v) for v in values], drives, last=last)
-        frames = self.fitted[self.fitted <= last]
-        return [
-            None if isinstance(run, Breakdown) else self.observation.residual(run.u, frames).ravel() for run in runs
-        ]
+        return [None if isinstance(run, Breakdown) else self._apart(run, self.observation, last) for run in runs]
 
     @cached_property
     def batch(self) -> Batch:

@@ -10,7 +10,6 @@ import numpy as np
 
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
-from surgisim.mpm.kink import Ball
 from surgisim.mpm.setup import Prepared
 from surgisim.mpm.simulator import Breakdown, Run, Simulator
 from surgisim.problem import Problem
@@ -34,7 +33,7 @@ class Batch:
         self.shift = np.array([self.apart * one.grid.spacing, 0.0, 0.0])
         grid = Grid(one.grid.origin, np.array([self.apart * copies, *one.grid.shape[1:]]), one.grid.spacing)
         moves = np.arange(copies)[:, None] * self.shift
-        balls = tuple(Ball(ball.center + move, ball.radius) for move in moves for ball in one.kinks.balls)
+        balls = tuple(replace(ball, center=ball.center + move) for move in moves for ball in one.kinks.balls)
         self.all = Simulator(
             rest=(one.rest + moves[:, None]).reshape(-1, 3), volume=np.tile(one.volume_p, copies),
             density=one.density, grid=grid, terms=one.terms, gravity=tuple(one.gravity), device=one.device,

@@ -34,6 +34,8 @@ class Ball:
     """At rest [m], (3,)."""
     radius: float
     """[m]"""
+    skin: float = 0.0
+    """Width of the shell about the radius in which the bend is spread out, 0 for a sharp one [m]."""
 
 
 class Kinks:
@@ -100,8 +102,12 @@ def _kinked(ball: Ball, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     arm = points - ball.center
     d = np.maximum(np.linalg.norm(arm, axis=1), 1e-6 * ball.radius)
     n = arm / d[:, None]
-    fall = np.exp(np.minimum(0.0, 1 - d / ball.radius))
-    psi, steep = fall - 1, np.where(d > ball.radius, -fall / ball.radius, 0.0)
+    skin = max(ball.skin, 1e-6 * ball.radius)
+    # How much of the shell lies outside the ball, and how far beyond the skin what is there is on average.
+    outside = np.clip((d - ball.radius) / skin + 0.5, 0.0, 1.0)
+    beyond = np.where(outside < 1.0, 0.5 * skin * outside**2, d - ball.radius)
+    fall = np.exp(-beyond / ball.radius)
+    psi, steep = fall - 1, -fall / ball.radius * outside
     p = np.concatenate([np.ones((len(d), 1)), n], 1)
     turn = np.zeros((len(d), FUNCTIONS, 3))
     turn[:, 1:] = (np.eye(3) - n[:, :, None] * n[:, None, :]) / d[:, None, None]

@@ -27,6 +27,8 @@ from surgisim.problem import Problem
 Values = dict[str, Numbers]
 """Law -> parameter -> value."""
 
+SKIN = 1.0
+"""Width of a filmed grip's skin, in particles: where a grip is searched for, see `prepare`."""
 LEAST_GRIP, LEAST_SHARP = 1.0, 0.5
 """Smallest radius of a grip, in cells: of one that splines alone carry, and of one at whose skin the displacement may
 bend (kink.py), which still holds a few particles then."""
@@ -166,11 +168,13 @@ def prepare(
     threads: int = 1,
     form: str = "total",
     grips: Motion | None = None,
+    skin: float = 0.0,
 ) -> Prepared:
     """Lay the grid around the body and every further rest point it has to carry [m], (Q, 3).
 
     form: 'total', or 'updated' for the paper's (single precision, one thread, no adjoint, no cut). grips: a motion that
-    will be replayed, so that the tissue may bend sharply at the skin of what it grips.
+    will be replayed, so that the tissue may bend sharply at the skin of what it grips; skin: particles' widths in which
+    that bend is spread out, so that a grip that is searched for can be moved without particles changing sides at once.
     """
     given = {
         "rest": body.rest, "volume": body.volume, "density": density,
@@ -180,7 +184,8 @@ def prepare(
     if form == "updated":
         return Prepared(Updated(**given), tuple(terms), density, body, places or {})
     held = () if grips is None else zip(grips.center_rest, widened(grips.radius, body.spacing), strict=True)
-    balls = tuple(Ball(np.asarray(c, float), float(r)) for c, r in held)
+    wide = skin * float(np.cbrt(np.median(body.volume)))
+    balls = tuple(Ball(np.asarray(c, float), float(r), wide) for c, r in held)
     simulator = Simulator(**given, precision=precision, threads=threads, balls=balls)
     return Prepared(simulator, tuple(terms), density, body, places or {})
 

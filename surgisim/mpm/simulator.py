@@ -57,6 +57,10 @@ class Run:
     def state(self, t: int) -> State:
         return self.u[t], self.v[t], self.q[t]
 
+    def after(self, frames: int) -> "Run":
+        """The same after so many more frames in its first state."""
+        return Run(*(np.concatenate([np.repeat(part[:1], frames, 0), part]) for part in (self.u, self.v, self.q)))
+
 
 @dataclass(frozen=True)
 class Gradient:

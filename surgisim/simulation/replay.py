@@ -13,7 +13,7 @@ from surgisim.artifacts.replay import Replay
 from surgisim.artifacts.scene import Scene
 from surgisim.config.simulation import Simulation
 from surgisim.mpm.grip import Drive
-from surgisim.mpm.setup import Prepared, checked_per_frame, prepare, theta_of, values_of
+from surgisim.mpm.setup import SKIN, Prepared, checked_per_frame, prepare, theta_of, values_of
 from surgisim.mpm.simulator import Run, Simulator
 from surgisim.physics.catalogue import choose, defaults
 from surgisim.problem import Problem
@@ -102,6 +102,7 @@ def _parts(body: Body, scene: Scene, physics: Physics, task: Plan, device: str) 
             body, tuple(physics.terms), density=physics.density, gravity=tuple(physics.gravity),
             carried=scene.mean.astype(float), cut=cut, device=device, form=physics.form, threads=THREADS,
             grips=task.motion,
+            skin=SKIN,
         )
         for cut in make
     ]  # fmt: skip

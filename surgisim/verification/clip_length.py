@@ -18,7 +18,7 @@ from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.observation import observe, phases
-from surgisim.estimation.rounds import choose_start, descend
+from surgisim.estimation.rounds import choose_start, descend, windows
 from surgisim.estimation.search import search
 from surgisim.estimation.trial import Trial
 from surgisim.mpm.setup import prepare
@@ -57,7 +57,8 @@ def fit(frames: int) -> dict:
     )
     settings, begun = Estimation(first_window=0.25, field_iterations=0), time.process_time()
     begin = choose_start(trial, wanted.start, [], lambda *_: None)
-    _, solution = descend(trial, begin, phases(motion, frames), settings, [], lambda *_: None)
+    ends = windows(trial.fitted, phases(motion, frames), settings.first_window)
+    _, solution = descend(trial, begin, ends, settings, [], lambda *_: None)
     seconds = time.process_time() - begun
     found = wanted.values(solution.x)
     return {

@@ -25,7 +25,7 @@ def width(q):
 
 
 def test_the_simulations_own_error_belongs_to_every_interval():
-    error = np.diag([0.03, 0.0, 0.04]) ** 2
+    error = {"grid": np.diag([0.03, 0.0, 0.04]) ** 2}
     alone, both = told(), told(error)
     for name, own in (("corotated.E", 0.03), ("newtonian.eta", 0.04), ("newtonian.eta / corotated.E", 0.05)):
         assert width(both[name]) == pytest.approx(np.hypot(width(alone[name]), own), rel=1e-9)
@@ -34,4 +34,4 @@ def test_the_simulations_own_error_belongs_to_every_interval():
 
 def test_what_the_simulation_itself_gets_wrong_by_much_is_not_told():
     assert told()["corotated.E"]["told"]
-    assert not told(np.diag([0.5, 0.0, 0.0]) ** 2)["corotated.E"]["told"]
+    assert not told({"grid": np.diag([0.5, 0.0, 0.0]) ** 2})["corotated.E"]["told"]

@@ -1,5 +1,8 @@
 """The displacement may bend at a grip's skin, and nothing else changes."""
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from slab import pulled, slab
@@ -23,10 +26,16 @@ def test_splines_and_kinks_have_nothing_in_common(sharp):
     assert (np.abs(overlap).max(0) < 2e-3 * alone).all()
 
 
-def test_a_kinks_gradient_is_its_slope(sharp):
+@pytest.mark.parametrize("skin", [0.0, 1.0])
+def test_a_kinks_gradient_is_its_slope(skin):
+    sharp = prepare(BODY, tuple(SOFT), density=1050.0, grips=pulled(), skin=skin)
     rng, h = np.random.default_rng(0), 1e-7
     points = np.array([0.0, 0.0, 0.066]) + rng.uniform(-0.009, 0.009, (40, 3)) * [1, 1, 0.5]
-    simulator, dense = sharp.simulator, lambda x: sharp.simulator.carry(x).toarray()
+    simulator = sharp.simulator
+
+    def dense(x):
+        return simulator.carry(x).toarray()
+
     index, link = simulator.links(points)
     for axis in range(3):
         step = h * np.eye(3)[axis]
@@ -89,3 +98,24 @@ def test_a_grip_smaller_than_a_cell_carries_what_a_finer_grid_says():
     wanted = np.linalg.norm(motion.position[0, 8] - motion.center_rest[0])
     # Widened to a cell it would be off by half of that.
     assert np.abs(found[0] - found[1]).max() < 0.12 * wanted
+
+
+def test_a_grip_with_a_skin_can_be_moved_a_little_without_a_jump():
+    points = BODY.rest[BODY.surface].astype(float)
+
+    def replayed(skin, aside):
+        motion = pulled()
+        move = np.array([aside, 0.0, 0.0])
+        motion = replace(motion, center_rest=motion.center_rest + move, position=motion.position + move)
+        made = prepare(BODY, tuple(SOFT), density=1050.0, carried=points, grips=motion, skin=skin)
+        path = made.drive(motion, SOFT, fps=FPS, per_frame=80)
+        return made.simulator.carry(points) @ made.simulator.run(made.theta(SOFT), path, last=6).u[-1].astype(float)
+
+    def jump(skin):
+        """Largest change of the response from one of many small moves to the next, over the mean one."""
+        moved = [replayed(skin, 1e-4 * k) for k in range(9)]
+        steps = [np.abs(b - a).mean() for a, b in itertools.pairwise(moved)]
+        return max(steps) / np.mean(steps)
+
+    assert jump(1.0) < 2.0
+    assert jump(1.0) < jump(0.0)

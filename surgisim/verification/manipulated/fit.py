@@ -7,7 +7,7 @@ import numpy as np
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.observation import Observation, phases
-from surgisim.estimation.rounds import choose_start, descend
+from surgisim.estimation.rounds import choose_start, descend, windows
 from surgisim.estimation.search import search
 from surgisim.estimation.trial import WORKERS, Trial, at_once
 from surgisim.mpm.setup import Values, prepare
@@ -85,8 +85,8 @@ def fitted(
     """
     rough, fine = (trial(scene, h, seen, split, last, noise=noise, seed=seed) for h in (COARSER * spacing, spacing))
     phase, settings = phases(fine.motion, fine.frames), Estimation(iterations=6, first_window=1.0)
-    begin = choose_start(rough, [], lambda *_: None)
-    return fine, descend(fine, begin, phase, settings, [], lambda *_: None)
+    begin = choose_start(rough, rough.wanted.start, [], lambda *_: None)
+    return descend(fine, begin, windows(fine.fitted, phase, settings.first_window), settings, [], lambda *_: None)
 
 
 def mistaken(at_truth: Trial) -> np.ndarray:

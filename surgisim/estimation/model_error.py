@@ -1,0 +1,78 @@
+"""What a simulation of a film gets wrong although its numbers are right, as an error that goes with the pull.
+
+The surface's shape, the rim and the grip are guesses, so that the simulated displacement is a smooth field off, in
+proportion to how far the tissue is carried: the same field in all frames of a pull. A fit that took its thousands of
+differences for independent would bend the tissue's numbers after it. Here the field is a Gaussian process and is
+integrated out (Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63, 2001), so that the shape of
+the motion tells as much as a few dozen numbers do, and the course in time, which the field does not bend, all it can.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from surgisim.estimation.observation import Observation
+
+SHARE = 0.15
+"""Spread of the field, as a share of the local displacement."""
+REACH = 0.5
+"""Its length scale, as a share of how far the motion spreads."""
+LEAST = 1e-3
+"""Modes with less than this share of the first one's variance are left out."""
+FLOOR = 0.05
+"""Where tissue hardly moves, the field is this share of the farthest displacement's."""
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """The error's modes at the tracked points."""
+
+    modes: np.ndarray
+    """Times their standard deviations, as shares of `size`, (K, Q)."""
+    size: np.ndarray
+    """Displacement over the standard deviation of what is seen, (K, T, 3)."""
+    independent: float
+    """Share of the seen numbers that counts as independent."""
+    kept: dict = field(default_factory=dict, compare=False)
+
+    def whiten(self, r: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """Residuals whose squares tell what the error leaves to tell, from weighted ones at `frames`, (K, F, 3).
+
+        With noise of variance 1 / independent beside the error's B B^T, this is (1 + independent B B^T)^(-1/2) r.
+        """
+        size, inner = self._of(frames)
+        out = r.copy()
+        for c in range(r.shape[-1]):
+            told = self.modes.T @ (size[..., c] * r[..., c]).sum(1)
+            out[..., c] -= size[..., c] * (self.modes @ (inner[c] @ told))[:, None]
+        return out
+
+    def _of(self, frames: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+        key = frames.tobytes()
+        if key not in self.kept:
+            size = np.sqrt(self.independent) * self.size[:, frames]
+            inner = []
+            for c in range(size.shape[-1]):
+                gram = (self.modes * (size[..., c] ** 2).sum(1)[:, None]).T @ self.modes
+                value, vector = np.linalg.eigh(gram)
+                value = np.maximum(value, 1e-12)
+                inner.append((vector * ((1 - 1 / np.sqrt(1 + value)) / value)) @ vector.T)
+            self.kept[key] = size, inner
+        return self.kept[key]
+
+
+def model_error(seen: Observation, course: np.ndarray, independent: float) -> ModelError:
+    """The error of a simulation that is compared with these points; course: share of the pull in every frame, (T,)."""
+    used = seen.weight > 0
+    moved = np.linalg.norm(seen.displacement * used, axis=-1)
+    at = int(np.argmax(np.where(used.any(-1).mean(0) > 0.5, course, -1.0)))
+    far = moved[:, at] / max(abs(course[at]), 1e-9)
+    far = np.maximum(far, FLOOR * np.percentile(far, 99))
+    middle = np.average(seen.rest, axis=0, weights=far**2)
+    away = np.linalg.norm(seen.rest - middle, axis=1)
+    reach = REACH * np.sqrt(np.average(away**2, weights=far**2))
+    apart = np.linalg.norm(seen.rest[:, None] - seen.rest[None], axis=-1)
+    value, vector = np.linalg.eigh(np.exp(-0.5 * (apart / reach) ** 2))
+    chosen = value > LEAST * value[-1]
+    modes = SHARE * vector[:, chosen] * np.sqrt(value[chosen])
+    return ModelError(modes, seen.weight * far[:, None, None] * np.abs(course)[None, :, None], independent)

@@ -1,0 +1,254 @@
+"""What a fit takes for granted, and where its numbers would lie if that were otherwise.
+
+Noise alone says too little of how sure a fit can be: a focal length that nobody gave, a surface whose slope was
+guessed, an elastic law that was chosen and a rim that no camera sees bend every number, and the misfit hardly shows
+it. Here the same clip is fitted again with each of these changed, by steps of the derivative that is already known.
+
+What the clip cannot tell is changed by one standard deviation of its prior, and the numbers' answer counts as one of
+theirs (consider parameters: Schmidt, Application of state-space methods to navigation problems, Advances in control
+systems 3, 1966). What competes with what was chosen, as another law does, counts by how well it fits.
+"""
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from surgisim.artifacts.camera import Camera
+from surgisim.estimation.gauss_newton import WIDTH, Solution, misfit
+from surgisim.estimation.identify import spread_of
+from surgisim.estimation.rounds import INDEPENDENT
+from surgisim.estimation.search import Search
+from surgisim.estimation.support import EDGES
+from surgisim.estimation.trial import Trial, at_once
+from surgisim.estimation.view import View
+from surgisim.mpm.setup import Prepared
+from surgisim.physics.catalogue import catalogue
+
+LENS = 0.3
+"""Spread of the logarithm of a focal length that was assumed: endoscopes see 35 to 75 degrees across."""
+SLOPE, BEND = 0.15, 0.4
+"""Spread of a surface's slope, each way, and of its bend, where its shape was guessed from one view: on ten clips of
+family 900 those of light alone are .02 to .27 and .02 to .44 off."""
+COARSER = 1.25
+"""Grid spacing that is tried, over the fit's own."""
+TO_NOTHING = 1 / (COARSER**2 - 1)
+"""How many times what a coarser grid changes, the fit's own grid is off: errors go with the square of its spacing."""
+FARTHER = (-1.6, -0.8, 0.8, 1.6)
+"""Logarithms of how many times stiffer tissue is tried beside the one found."""
+BY_FAR = 2.0
+"""Logarithm of how many times more probable a rival is that takes the fit's place."""
+MOST_ODDS = 20.0
+"""Largest logarithm of how many times more probable a rival can be."""
+STEPS, ENOUGH = 4, 0.01
+"""Most steps to where a fit lies otherwise, and the share of its cost that one must win for another."""
+AS_IT_IS = "nothing"
+"""What is changed where a fit is only brought to where these steps would bring it."""
+
+Say = Callable[[float, float, str], None]
+Make = Callable[..., Prepared]
+"""Prepares a body under a motion; for other laws, and for other points that it carries, where those are given."""
+
+
+@dataclass(frozen=True)
+class Otherwise:
+    """One thing that was taken for granted, changed."""
+
+    about: str
+    trial: Trial
+    rival: bool = False
+    """Whether it competes with what was chosen by how well it fits."""
+    told: bool = False
+    """Whether it is one prior standard deviation of something whose size the clip may tell."""
+    size: float = 1.0
+    """How many times the answer counts where it is neither."""
+    begin: np.ndarray | None = None
+    """Where the fit begins, if not from the one that is asked about, (M,)."""
+    open: np.ndarray | None = None
+    """Which numbers are fitted anew, (M,) bool; all if None."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Where a fit lies when one thing is changed."""
+
+    one: Otherwise
+    x: np.ndarray
+    """The numbers there, in search space, (M,)."""
+    residual: np.ndarray | None
+    """Weighted, (R,); None where it cannot be simulated."""
+    cost: float
+
+
+def rivals(trial: Trial, x: np.ndarray) -> Iterator[Otherwise]:
+    """What may take the place of a fit with a body laid for it that ended at x, (M,); first that itself, once more."""
+    yield Otherwise(AS_IT_IS, trial, rival=True)
+    laying = trial.laying
+    for edge in EDGES:
+        margin = edge.beyond * trial.wanted.depth.size
+        if (margin, edge.rim) != (laying.margin, laying.rim):
+            yield Otherwise(
+                f"{margin * 1e3:.0f} mm beyond the picture, {'held' if edge.rim else 'free'}",
+                replace(trial, laying=laying.ending(margin, edge.rim)),
+                rival=True,
+            )
+    yield from _moduli(trial, x)
+
+
+def otherwise(trial: Trial, camera: Camera, points: np.ndarray, make: Make) -> Iterator[Otherwise]:
+    """What else a fit with a body laid for it takes for granted, each changed; first nothing.
+
+    points: what its grid reaches to at least [m], (Q, 3).
+    """
+    yield Otherwise(AS_IT_IS, trial)
+    yield from _views(trial, camera, points, make)
+    laying = trial.laying
+    coarse = replace(laying.whole, spacing=COARSER * laying.columns.spacing)
+    coarse = replace(laying, columns=coarse, margin=0.0, kept={})
+    yield Otherwise("grid", replace(trial, laying=coarse), size=TO_NOTHING)
+    yield from _laws(trial, make)
+
+
+def _moduli(trial: Trial, x: np.ndarray) -> Iterator[Otherwise]:
+    """Stiffer and softer tissue, each with all else at its best: a ring-down is told by whole periods, in valleys."""
+    low, high = trial.wanted.bounds
+    for k, (law, name, _) in enumerate(trial.wanted.free):
+        if name != "E":
+            continue
+        for step in FARTHER:
+            begin = x + step * np.array([n.endswith((".E", ".eta")) for n in trial.wanted.names])
+            if low[k] <= begin[k] <= high[k]:
+                about = f"{law} {np.exp(step):.2g} times as stiff"
+                yield Otherwise(about, trial, True, begin=np.clip(begin, low, high), open=np.arange(len(x)) != k)
+
+
+def _views(trial: Trial, camera: Camera, points: np.ndarray, make: Make) -> Iterator[Otherwise]:
+    seen = trial.observation
+    middle = np.median(seen.rest[:, :2] / seen.rest[:, 2:], axis=0)
+    changes: dict[str, dict[str, float]] = {}
+    if camera.focal_from == "assumed":
+        changes["focal length"] = {"lens": float(np.exp(LENS))}
+    if not (seen.weight[..., 2] > 0).any():
+        changes |= {"slope across": {"right": SLOPE}, "slope down": {"down": SLOPE}, "bend": {"bowl": BEND}}
+    for about, change in changes.items():
+        view = View(camera, middle, **change)
+        carried = points * view.factor(points)
+        yield Otherwise(about, seen_as(trial, view, partial(make, carried=carried)), told=True)
+
+
+def seen_as(trial: Trial, view: View, make: Make) -> Trial:
+    """The trial of the same recording in another view; make: as it prepares bodies there."""
+    wanted, laying = trial.wanted, trial.laying
+    if wanted.carrying:
+        carrying = replace(wanted.carrying, motion=view.motion(wanted.carrying.motion), camera=view.seen_by)
+        wanted = replace(wanted, carrying=carrying)
+    observation = view.observation(trial.observation)
+    laying = replace(
+        laying, columns=view.columns(laying.whole), margin=0.0, observation=observation, make=make, kept={}
+    )
+    return replace(trial, wanted=wanted, motion=view.motion(trial.motion), observation=observation, laying=laying)
+
+
+def _laws(trial: Trial, make: Make) -> Iterator[Otherwise]:
+    """Every elastic law that has the same numbers as the chosen one."""
+    wanted, known = trial.wanted, catalogue()
+    for law in wanted.terms:
+        for rival, term in known.items():
+            same = term.energy is not None and term.params.keys() == known[law].params.keys()
+            if same and rival not in wanted.terms and known[law].energy is not None:
+                terms = tuple(rival if name == law else name for name in wanted.terms)
+                free = tuple((rival if name == law else name, param, p) for name, param, p in wanted.free)
+                base = {rival if name == law else name: values for name, values in wanted.base.items()}
+                laying = replace(trial.laying, make=partial(make, terms=terms), kept={})
+                changed = replace(wanted, terms=terms, free=free, base=base)
+                yield Otherwise(rival, replace(trial, wanted=changed, laying=laying), rival=True)
+
+
+def answers(solution: Solution, wanted: Search, changed: list[Otherwise], say: Say) -> list[Answer]:
+    """Where the fit lies with each thing changed, in their order; say(done, of, what)."""
+    weights = _weights(solution.residual)
+    hessian = (solution.jacobian * weights[:, None]).T @ solution.jacobian + np.diag(1 / wanted.spread**2)
+    said = itertools.count(1)
+
+    def of(one: Otherwise, worker: int) -> Answer:
+        found = _settled(one, solution.x, hessian, solution.jacobian, worker)
+        say(next(said), len(changed), f"if it were otherwise: {one.about}")
+        return found
+
+    return at_once(of, changed)
+
+
+def better(solution: Solution, wanted: Search, found: list[Answer]) -> Answer | None:
+    """The rival that is more probable by far than this fit, if one is."""
+    best = min(found, key=lambda a: a.cost)
+    gain = cost_of(solution.residual, solution.x, wanted) - best.cost
+    return best if 0.5 * gain / spread_of(solution.residual) > BY_FAR else None
+
+
+def shares(solution: Solution, wanted: Search, found: list[Answer]) -> list[float]:
+    """How often each shift of the numbers counts, squared: a rival's probability.
+
+    Otherwise the mean square of how far the thing itself may be from what was taken, over the change that was made,
+    given the prior and what the misfit says of it.
+    """
+    cost, scale = cost_of(solution.residual, solution.x, wanted), spread_of(solution.residual)
+    odds = [np.exp(min(0.5 * (cost - a.cost) / scale, MOST_ODDS)) if a.one.rival else 0.0 for a in found]
+    weights, result = _weights(solution.residual), []
+    for a, odd in zip(found, odds, strict=True):
+        if a.one.rival:
+            result.append(float(odd / (1.0 + sum(odds))))
+        elif a.residual is None or not a.one.told:
+            result.append(a.one.size**2)
+        else:
+            result.append(_mean_square(weights, solution.residual, a.residual, scale))
+    return result
+
+
+def cost_of(r: np.ndarray, x: np.ndarray, wanted: Search) -> float:
+    """What the descent minimises."""
+    return INDEPENDENT * misfit(r) + float((((x - wanted.start) / wanted.spread) ** 2).sum())
+
+
+def _mean_square(weights: np.ndarray, here: np.ndarray, there: np.ndarray, scale: float) -> float:
+    """Of the step from what was taken for granted to what is true, where this one led from residuals here to there.
+
+    Its prior is a standard deviation of 1, and the misfit along it is taken for a parabola.
+    """
+    apart = there - here
+    precision = 1.0 + float(weights @ apart**2) / scale
+    return (float(weights @ (apart * here)) / scale / precision) ** 2 + 1.0 / precision
+
+
+def _weights(r: np.ndarray) -> np.ndarray:
+    """How much each residual counts, (R,): less where it is large, as in the descent."""
+    return INDEPENDENT / np.maximum(1.0, np.abs(r) / WIDTH)
+
+
+def _settled(one: Otherwise, x: np.ndarray, hessian: np.ndarray, J: np.ndarray, worker: int) -> Answer:
+    """Where a fit near x lies otherwise, by steps of a derivative taken at x."""
+    trial, wanted = one.trial, one.trial.wanted
+    low, high = wanted.bounds
+    x = x if one.begin is None else one.begin
+    free = np.flatnonzero(np.ones(len(x), bool) if one.open is None else one.open)
+    r = trial.residual(x, worker)
+    if r is None:
+        return Answer(one, x, r, np.inf)
+    cost, damping = cost_of(r, x, wanted), 0.01
+    for _ in range(STEPS):
+        g = J.T @ (_weights(r) * r) + (x - wanted.start) / wanted.spread**2
+        step = np.zeros(len(x))
+        damped = hessian + damping * np.diag(np.diag(hessian))
+        step[free] = np.linalg.solve(damped[np.ix_(free, free)], g[free])
+        at = np.clip(x - step, low, high)
+        there = trial.residual(at, worker)
+        reached = np.inf if there is None else cost_of(there, at, wanted)
+        if reached < cost:
+            gained = (cost - reached) / cost
+            x, r, cost, damping = at, there, reached, 0.1 * damping
+            if gained < ENOUGH:
+                break
+        else:
+            damping *= 30
+    return Answer(one, x, r, cost)

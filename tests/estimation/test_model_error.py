@@ -1,0 +1,58 @@
+"""An error that goes with the pull is integrated out, and only that."""
+
+import numpy as np
+import pytest
+
+from surgisim.estimation.model_error import model_error
+from surgisim.estimation.observation import Observation
+
+FRAMES, INDEPENDENT = 12, 0.02
+
+
+def seen(points=60, seed=3):
+    rng = np.random.default_rng(seed)
+    rest = np.concatenate([rng.uniform(-0.02, 0.02, (points, 2)), np.full((points, 1), 0.06)], 1)
+    course = np.concatenate([np.zeros(2), np.linspace(0, 1, 6), np.linspace(0.9, 0.0, 4)])
+    far = 0.005 * np.exp(-(np.linalg.norm(rest[:, :2], axis=1) ** 2) / 2 / 0.008**2)
+    displacement = far[:, None, None] * course[None, :, None] * np.array([1.0, 0.3, 0.0])
+    weight = np.full(displacement.shape, 1 / 1e-4)
+    weight[..., 2] = 0.0
+    weight[3, 5] = 0.0
+    return Observation(rest, displacement, weight, None), course
+
+
+def test_whitening_is_the_inverse_root_of_the_whole_covariance():
+    observation, course = seen()
+    error, frames = model_error(observation, course, INDEPENDENT), np.arange(1, 10)
+    r = np.random.default_rng(0).normal(size=(60, len(frames), 3)) * (observation.weight[:, frames] > 0)
+    got = error.whiten(r, frames)
+    for c in range(2):
+        B = (error.size[:, frames, c][:, :, None] * error.modes[:, None, :]).reshape(-1, error.modes.shape[1])
+        value, vector = np.linalg.eigh(np.eye(len(B)) + INDEPENDENT * B @ B.T)
+        dense = (vector / np.sqrt(value)) @ vector.T @ r[..., c].ravel()
+        assert got[..., c].ravel() == pytest.approx(dense, abs=1e-9)
+    assert (got[..., 2] == 0).all()
+
+
+def test_a_field_that_goes_with_the_pull_hardly_counts_and_one_that_does_not_counts_whole():
+    observation, course = seen()
+    error, frames = model_error(observation, course, INDEPENDENT), np.arange(1, FRAMES)
+    field = 0.2 * (
+        observation.displacement / np.maximum(np.linalg.norm(observation.displacement, axis=-1), 1e-12)[..., None]
+    )
+    far = np.linalg.norm(observation.displacement, axis=-1).max(1)[:, None, None]
+    late = (course[frames] < 0.35)[None, :, None] & (frames > 6)[None, :, None]
+    along = observation.weight[:, frames] * field[:, frames] * far * course[None, frames, None]
+    after = observation.weight[:, frames] * field[:, frames] * far * late
+    assert (error.whiten(along, frames) ** 2).sum() < 0.2 * (along**2).sum()
+    assert (error.whiten(after, frames) ** 2).sum() > 0.8 * (after**2).sum()
+
+
+def test_windows_leave_out_what_they_do_not_see():
+    observation, course = seen()
+    error = model_error(observation, course, INDEPENDENT)
+    r = np.random.default_rng(1).normal(size=(60, FRAMES - 1, 3)) * (observation.weight[:, 1:] > 0)
+    short = error.whiten(r[:, :4], np.arange(1, 5))
+    assert (short**2).sum() <= (r[:, :4] ** 2).sum()
+    # The longer a window, the surer the field, and the more of it is taken out of the same frames.
+    assert np.abs(error.whiten(r, np.arange(1, FRAMES))[:, :4] - short).max() > 0
