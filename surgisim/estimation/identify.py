@@ -137,6 +137,10 @@ def in_words(
             + ", ".join(_quoted(n, table[n]) for n in edges)
             + "."
         )
+    resting = {cause for n in told for cause in table[n]["rests_on"]}
+    for cause in sorted(resting):
+        names = ", ".join(n for n in told if cause in table[n]["rests_on"])
+        parts.append(f"How far {names} may be off rests on what was taken for granted: {cause}.")
     if damping is not None:
         parts.append(f"At this step and grid the method itself damps free vibration by {abs(damping):.2g} per second.")
     return " ".join(parts)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from surgisim.estimation.gauss_newton import Solution
-from surgisim.estimation.identify import identifiability
+from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.search import search
+from surgisim.estimation.support import Support
 
 
 def told(model=None):
@@ -35,3 +36,11 @@ def test_the_simulations_own_error_belongs_to_every_interval():
 def test_what_the_simulation_itself_gets_wrong_by_much_is_not_told():
     assert told()["corotated.E"]["told"]
     assert not told({"grid": np.diag([0.5, 0.0, 0.0]) ** 2})["corotated.E"]["told"]
+
+
+def test_what_an_interval_rests_on_is_named():
+    table = told({"focal length": np.diag([0.05, 0.0, 0.0]) ** 2, "grid": np.diag([0.001, 0.0, 0.0]) ** 2})
+    assert list(table["corotated.E"]["rests_on"]) == ["focal length"]
+    assert table["corotated.nu"]["rests_on"] == {}
+    words = in_words(table, Support(0.01, 0.0, False), 1.0, 20, 1e-3, 1e-4, None)
+    assert "corotated.E" in next(part for part in words.split("How far ")[1:] if part.endswith("focal length."))
