@@ -42,6 +42,8 @@ BY_FAR = 2.0
 """Logarithm of how many times more probable a rival is that takes the fit's place."""
 MOST_ODDS = 20.0
 """Largest logarithm of how many times more probable a rival can be."""
+RESOLVED = 0.25
+"""Standard deviation of where a grip's skin lies between particles, in their widths."""
 STEPS, ENOUGH = 4, 0.01
 """Most steps to where a fit lies otherwise, and the share of its cost that one must win for another."""
 AS_IT_IS = "nothing"
@@ -109,6 +111,14 @@ def otherwise(trial: Trial, camera: Camera, points: np.ndarray, make: Make) -> I
     coarse = replace(laying, columns=coarse, margin=0.0, kept={})
     yield Otherwise("grid", replace(trial, laying=coarse), size=TO_NOTHING)
     yield from _laws(trial, make)
+
+
+def resolution(trial: Trial, x: np.ndarray) -> np.ndarray:
+    """Covariance of what particles leave open of where a grip's skin lies, in search space, (M, M)."""
+    body = trial.stand(x)[0].bodies[0].body
+    width = RESOLVED * float(np.cbrt(np.median(body.volume)))
+    names = {u.name: width / u.size for u in trial.wanted.open if u.name.endswith((".radius", ".right", ".down"))}
+    return np.diag([names.get(name, 0.0) ** 2 for name in trial.wanted.names])
 
 
 def _moduli(trial: Trial, x: np.ndarray) -> Iterator[Otherwise]:
