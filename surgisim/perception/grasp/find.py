@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from surgisim.perception.grasp.ahead import just_hidden, leading
 from surgisim.perception.grasp.contact import contact
-from surgisim.perception.grasp.following import AROUND, FEW, Following, following, jaw_motion
+from surgisim.perception.grasp.following import AROUND, Following, following, jaw_motion
 from surgisim.perception.grasp.holding import began, held, let_go
 from surgisim.perception.grasp.instruments import Instrument
 
@@ -64,7 +65,7 @@ def find(
         at_jaws = contact(flow, tool.jaws, xy).away
         follows = following(xy, seen, at_jaws, touched, jaw_motion(flow, tool, side), tool.tip - tool.entry, side)
         for first, last in held(follows, side):
-            found = _grip(xy, seen, at_jaws, tool, follows, (first, last), side, cell)
+            found = _grip(xy, seen, touched, at_jaws, tool, follows, (first, last), side, cell)
             if found is not None:
                 grip, course = found
                 candidates.append((replace(grip, instrument=index), course))
@@ -75,11 +76,13 @@ def find(
     return [g for g, _ in grips]
 
 
-def _grip(xy, seen, at_jaws, tool: Instrument, follows: Following, stretch: tuple[int, int], side: int, cell: float):
+def _grip(
+    xy, seen, touched, at_jaws, tool: Instrument, follows: Following, stretch: tuple[int, int], side: int, cell: float
+):
     """The grip of one stretch and the course of what it holds [px], (T, 2); none if no tissue is there."""
     frames, (first, last) = xy.shape[1], stretch
     start = xy[:, 0]
-    center = _place(xy, seen, at_jaws, tool, follows, (first, last), side)
+    center = _place(xy, seen, touched, at_jaws, tool, follows, (first, last), side)
     if center is None:
         return None
     near = np.argsort(np.linalg.norm(start - center, axis=-1))[:9]
@@ -95,42 +98,27 @@ def _grip(xy, seen, at_jaws, tool: Instrument, follows: Following, stretch: tupl
     return Grip(center, radius, begin, end, confidence, float(far.max())), course
 
 
-def _place(xy, seen, at_jaws, tool: Instrument, follows: Following, stretch: tuple[int, int], side: int):
+def _place(xy, seen, touched, at_jaws, tool: Instrument, follows: Following, stretch: tuple[int, int], side: int):
     """Where in frame 0 the tissue lies that is at the jaws as they close [px], (2,); none where they are not seen.
 
-    A little behind the tip, as far as tissue that is seen ahead of it goes along less than the jaws: then it strains.
-    Tissue ahead that goes along entirely is between jaws of which the mask shows only the rear.
+    Of three: a little behind the tip; halfway from the tip to tissue that has just got hidden ahead of it, by jaws that
+    the mask lacks; halfway to tissue ahead of it that goes along entirely, and is between jaws that were never masked.
     """
     first, last = stretch
-    start, ends, places = xy[:, 0], [], []
     frames = np.arange(max(first - 3, 0), min(first + 1, last) + 1)
     frames = frames[np.isfinite(tool.tip[frames, 0])]
     if not len(frames):
         return None
+    start, ends, inward = xy[:, 0], [], np.nanmedian(tool.entry[frames] - tool.tip[frames], axis=0)
     for t in frames:
-        inward = tool.entry[t] - tool.tip[t]
-        jaw = tool.tip[t] + BEHIND * side * inward / max(np.linalg.norm(inward), 1e-9)
-        near = np.argsort(np.linalg.norm(xy[:, t] - jaw, axis=-1))[:6]
-        drift = np.median(xy[near, t] - start[near], axis=0)
-        places.append(jaw - drift)
-        ends.append(tool.tip[t] - drift)
-    behind, tip = np.median(places, axis=0), np.median(ends, axis=0)
-    way = np.nancumsum(follows.jaws[first : last + 1], axis=0)
-    enough = np.flatnonzero(np.linalg.norm(way, axis=-1) > 0.05 * side)
-    n = int(enough[0]) + 1 if len(enough) else len(way)
-    top, way = min(first + n, last), way[n - 1]
-    t = frames[np.abs(frames - first).argmin()]
-    outward = tool.tip[t] - tool.entry[t]
-    ahead = (xy[:, first] - tool.tip[t]) @ outward / max(np.linalg.norm(outward), 1e-9) > -0.01 * side
-    near = seen[:, first] & seen[:, top] & ahead & (at_jaws[:, first] < 0.06 * side)
-    if near.sum() < FEW:
-        return behind
-    moved = xy[near, top] - xy[near, first]
-    long = np.maximum(np.linalg.norm(moved, axis=-1), np.linalg.norm(way))
-    alike = 1 - np.linalg.norm(moved - way, axis=-1) / np.maximum(long, 1e-9)
-    lead = alike >= np.quantile(alike, 0.8)
-    share = np.clip((alike[lead].mean() - 0.5) / 0.3, 0, 1)
-    return behind + share * (0.5 * (np.median(start[near][lead], axis=0) + tip) - behind)
+        near = np.argsort(np.linalg.norm(xy[:, t] - tool.tip[t], axis=-1))[:6]
+        ends.append(tool.tip[t] - np.median(xy[near, t] - start[near], axis=0))
+    tip, inward = np.median(ends, axis=0), inward / max(np.linalg.norm(inward), 1e-9)
+    hidden = just_hidden(xy, seen, touched, tool, first, last, side)
+    if len(hidden):
+        return 0.5 * (tip + np.median(hidden, axis=0))
+    lead, share = leading(xy, seen, at_jaws, tool, follows, stretch, side)
+    return tip + (1 - share) * BEHIND * side * inward + 0.5 * share * (lead - tip)
 
 
 def _radius(start, moved: np.ndarray, center: np.ndarray, side: int, cell: float) -> float:
