@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from pulled_points import H, W, Pull, course, pulled
+from pulled_points import H, Pull, W, course, pulled
 
 from surgisim.perception.grasp.find import LIKELY, find
 from surgisim.perception.grasp.instruments import instruments

@@ -3,7 +3,7 @@
 import re
 
 import numpy as np
-from pulled_points import H, W, Pull, course, pulled
+from pulled_points import H, Pull, W, course, pulled
 from pulled_sheet import camera, pull_sheet
 
 from surgisim.artifacts.depth import Depth

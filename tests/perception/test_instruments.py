@@ -1,7 +1,7 @@
 """Each instrument is followed on its own, and its tip is the end away from where it enters."""
 
 import numpy as np
-from pulled_points import H, W, Pull, course, pulled
+from pulled_points import H, Pull, W, course, pulled
 
 from surgisim.perception.grasp.instruments import instruments
 
