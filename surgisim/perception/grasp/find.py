@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from surgisim.perception.grasp.ahead import just_hidden, leading
 from surgisim.perception.grasp.contact import contact
 from surgisim.perception.grasp.following import AROUND, Following, following, jaw_motion
 from surgisim.perception.grasp.holding import began, held, let_go
 from surgisim.perception.grasp.instruments import Instrument
+from surgisim.perception.grasp.jaw_tissue import just_hidden, leading
 
 ALIKE = 0.15
 """Largest difference of displacement within the held ball, as a share of it."""
@@ -102,7 +102,7 @@ def _place(xy, seen, touched, at_jaws, tool: Instrument, follows: Following, str
     """Where in frame 0 the tissue lies that is at the jaws as they close [px], (2,); none where they are not seen.
 
     Of three: a little behind the tip; halfway from the tip to tissue that has just got hidden ahead of it, by jaws that
-    the mask lacks; halfway to tissue ahead of it that goes along entirely, and is between jaws that were never masked.
+    the mask lacks; halfway to the tissue about it that goes along as one, as far as any does.
     """
     first, last = stretch
     frames = np.arange(max(first - 3, 0), min(first + 1, last) + 1)

@@ -36,8 +36,8 @@ def _states(evidence: np.ndarray) -> np.ndarray:
     """0 or 1 for each frame, evidence (T,) being what a frame says for 1."""
     score, came = np.zeros(2), np.zeros((len(evidence), 2), int)
     for t, e in enumerate(evidence):
-        # A tie goes to what was before.
-        came[t] = [int(score[1] - SWITCH > score[0]), int(score[1] >= score[0] - SWITCH)]
+        # Of two histories as likely, tissue is taken later, and let go later: as far as can be seen it is still held.
+        came[t] = [int(score[1] - SWITCH >= score[0]), int(score[1] > score[0] - SWITCH)]
         score = score[came[t]] - SWITCH * (came[t] != [0, 1]) + np.array([0.0, e])
     state = np.zeros(len(evidence), int)
     state[-1] = int(score[1] > score[0])

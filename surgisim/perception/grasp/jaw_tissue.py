@@ -1,4 +1,4 @@
-"""Tissue ahead of an instrument's tip that tells where its jaws are, if the mask shows only what is behind them."""
+"""Tissue about an instrument's tip that tells where its jaws are, where the mask shows only what is behind them too."""
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def _chained(points: np.ndarray, xy: np.ndarray, tip: np.ndarray, gap: float) ->
 
 
 def leading(xy, seen, at_jaws, tool: Instrument, follows: Following, stretch: tuple[int, int], side: int):
-    """Middle in frame 0 of the tissue ahead that follows the jaws best [px], (2,), and how entirely it does, 0-1."""
+    """Middle in frame 0 of the tissue about the tip that follows it best [px], (2,), and how entirely it does, 0-1."""
     first, last = stretch
     way = np.nancumsum(follows.jaws[first : last + 1], axis=0)
     told = np.flatnonzero(np.linalg.norm(way, axis=-1) > TELLING * side)
@@ -64,8 +64,8 @@ def leading(xy, seen, at_jaws, tool: Instrument, follows: Following, stretch: tu
     top, way = min(first + n, last), way[n - 1]
     known = np.flatnonzero(np.isfinite(tool.tip[:, 0]))
     t = int(known[np.abs(known - first).argmin()])
-    ahead = (xy[:, first] - tool.tip[t]) @ _outward(tool, t) > -0.5 * BESIDE * side
-    near = seen[:, first] & seen[:, top] & ahead & (at_jaws[:, first] < CLOSE * side)
+    about = np.linalg.norm(xy[:, first] - tool.tip[t], axis=-1) < 2 * CLOSE * side
+    near = seen[:, first] & seen[:, top] & about & (at_jaws[:, first] < CLOSE * side)
     if near.sum() < FEW:
         return np.zeros(2), 0.0
     moved = xy[near, top] - xy[near, first]
