@@ -28,7 +28,7 @@ from surgisim.problem import Problem
 
 DENSE = 2000
 """Points followed to find a grasp and to choose from."""
-SURE = 0.7
+SURE = 0.6
 """Confidence of a grasp below which the run says how to mark it."""
 
 
