@@ -8,7 +8,9 @@ from surgisim.artifacts.masks import Masks
 from surgisim.artifacts.motion import Motion
 from surgisim.config.base import parse
 from surgisim.config.tracking import Tracking
-from surgisim.perception.grasp.contact import contact, frame_flow
+from surgisim.perception.grasp.contact import distance, frame_flow
+from surgisim.perception.grasp.following import jaw_motion
+from surgisim.perception.grasp.instruments import instruments
 from surgisim.perception.tracking.follow import follow
 from surgisim.problem import Problem
 
@@ -85,12 +87,16 @@ def test_a_grasp_that_cannot_be_is_refused_in_a_sentence(sheet, grasp, word):
         _motion(sheet, {"grasp": [grasp]}, tissue=tissue)
 
 
-def test_the_instruments_own_motion_is_measured_on_it(sheet):
+def test_the_jaws_own_motion_is_measured_on_them(sheet):
+    flow = frame_flow(sheet.rgb)
+    (tool,) = instruments(sheet.tool, np.ones(sheet.tool.shape[1:], bool), flow)
+    step = np.diff(sheet.camera.project(sheet.grip), axis=0)[7]
+    assert np.linalg.norm(jaw_motion(flow, tool, 128)[7] - step) < 0.35 * np.linalg.norm(step)
+
+
+def test_distance_to_an_instrument_is_none_behind_it(sheet):
     tip = sheet.camera.project(sheet.grip)[None]
-    met = contact(frame_flow(sheet.rgb), sheet.tool, tip.astype(np.float32))
-    step = np.diff(tip[0], axis=0)[7]
-    assert met.away[0, 7] == 0
-    assert np.linalg.norm(met.mean_velocity(np.array([True]))[7] - step) < 0.35 * np.linalg.norm(step)
+    assert distance(sheet.tool, tip.astype(np.float32))[0, 7] == 0
 
 
 def _motion(sheet, settings=None, *, tool=None, tissue=None) -> Motion:

@@ -6,32 +6,33 @@ from scipy.ndimage import gaussian_filter1d
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.motion import Motion
-from surgisim.perception.grasp.contact import Contact
 from surgisim.perception.grasp.find import Grip
 from surgisim.perception.tracking import Paths
 from surgisim.perception.tracking.between import sample
 
 SHOWN = 3
 """Held points that must be seen for their way to be known."""
+ASTRAY, SLACK = 0.35, 0.015
+"""How far the ring may end from where the jaws take it, as a share of their way; and of the longer image side."""
 
 
 def carry(
-    grips: list[Grip], paths: Paths, contacts: list[Contact | None], depth: Depth, camera: Camera, source: str
+    grips: list[Grip], paths: Paths, jaws: list[np.ndarray | None], depth: Depth, camera: Camera, source: str
 ) -> Motion:
     """The grips as balls in the camera frame [m] and their ways.
 
-    paths: tissue points about each grip, hidden ones too. contacts: each grip's instrument as they meet it, none if
-    there is none. Behind the jaws the ball is carried by the ring of tissue around them that moves as one with it;
-    where that is hidden too, by the instrument.
+    paths: tissue points about each grip, hidden ones too. jaws: the motion of each grip's jaws to the next frame [px],
+    (T, 2), none if they are not known. The ball is carried by the ring of tissue around the jaws that moves as one with
+    it; where that is hidden, or is seen to go elsewhere than the jaws, by the jaws.
     """
     frames = paths.xy.shape[1]
     z = _depth_at(depth, paths.xy)
     center, radius, position, active = [], [], [], []
-    for grip, contact in zip(grips, contacts, strict=True):
+    for grip, step in zip(grips, jaws, strict=True):
         rest_z = float(sample(depth.z[0].astype(np.float32), grip.center[None, None].astype(np.float32))[0, 0])
         held = np.linalg.norm(paths.xy[:, 0] - grip.center, axis=-1)
         ring = held <= max(grip.radius, np.sort(held)[min(8, len(held) - 1)])
-        place, deep = _course(paths, z, ring, contact, grip)
+        place, deep = _course(paths, z, ring, step, grip, max(camera.width, camera.height))
         way = camera.lift(grip.center + place, rest_z + deep)
         rest = camera.lift(grip.center, np.array(rest_z))
         way[: grip.begin + 1] = rest
@@ -58,7 +59,7 @@ def _depth_at(depth: Depth, xy: np.ndarray) -> np.ndarray:
 
 
 def _course(
-    paths: Paths, z: np.ndarray, ring: np.ndarray, contact: Contact | None, grip: Grip
+    paths: Paths, z: np.ndarray, ring: np.ndarray, jaws: np.ndarray | None, grip: Grip, side: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement across [px], (T, 2), and along the view [m], (T,), of the held ball, smoothed in time."""
     moved = (paths.xy[ring] - paths.xy[ring, :1]).astype(float)
@@ -71,8 +72,8 @@ def _course(
         across[t] = np.median(moved[who, t], axis=0)
         # The ball moves as one and measured depth is too smooth: the most displaced fifth is nearest the truth.
         along[t] = np.percentile(deep[who, t], 20 if np.median(deep[who, t]) < 0 else 80)
-    if contact is not None:
-        across = _with_tool(across, seen.sum(0) >= SHOWN, contact.mean_velocity(ring), grip)
+    if jaws is not None:
+        across = _with_jaws(across, seen.sum(0) >= SHOWN, jaws, grip, side)
     stretch = slice(grip.begin, grip.end + 1)
     across[stretch] = gaussian_filter1d(across[stretch], 0.7, axis=0, mode="nearest")
     along[stretch] = gaussian_filter1d(along[stretch], 1.5, axis=0, mode="nearest")
@@ -83,14 +84,18 @@ def _course(
     return across, along
 
 
-def _with_tool(across: np.ndarray, shown: np.ndarray, tool: np.ndarray, grip: Grip) -> np.ndarray:
-    """`across` (T, 2), moved on by the instrument's own steps (T, 2) [px] from where it was last `shown` (T,)."""
+def _with_jaws(across: np.ndarray, shown: np.ndarray, jaws: np.ndarray, grip: Grip, side: int) -> np.ndarray:
+    """`across` (T, 2), moved on by the jaws' steps (T, 2) [px] from where it was last `shown` (T,) and with them."""
     out, last = across.copy(), grip.begin
     guessed = np.diff(across, axis=0, append=across[-1:])
-    step = np.where(np.isfinite(tool), tool, guessed)
+    step = np.where(np.isfinite(jaws), jaws, guessed)
+    way = np.zeros_like(out)
+    way[grip.begin + 1 :] = np.cumsum(step[grip.begin : -1], axis=0)
     for t in range(grip.begin + 1, grip.end + 1):
         out[t] = out[t - 1] + step[t - 1]
-        if shown[t]:
+        # Tissue that is held goes where the jaws go; a ring that does not has been lost, or was never held.
+        astray = np.linalg.norm(across[t] - across[grip.begin] - way[t])
+        if shown[t] and astray < ASTRAY * np.linalg.norm(way[t]) + SLACK * side:
             share = np.arange(last + 1, t + 1)[:, None] - last
             out[last + 1 : t + 1] += share / (t - last) * (across[t] - out[t])
             last = t

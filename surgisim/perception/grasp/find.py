@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from surgisim.perception.grasp.contact import contact
+from surgisim.perception.grasp.contact import distance
 from surgisim.perception.grasp.following import AROUND, Following, following, jaw_motion
 from surgisim.perception.grasp.holding import began, held, let_go
 from surgisim.perception.grasp.instruments import Instrument
@@ -59,10 +59,10 @@ def find(
     """
     if not tools or xy.shape[1] < 4:
         return []
-    touched = contact(flow, np.any([i.mask for i in tools], 0), xy).away
+    touched = distance(np.any([i.mask for i in tools], 0), xy)
     candidates: list[tuple[Grip, np.ndarray]] = []
     for index, tool in enumerate(tools):
-        at_jaws = contact(flow, tool.jaws, xy).away
+        at_jaws = distance(tool.jaws, xy)
         follows = following(xy, seen, at_jaws, touched, jaw_motion(flow, tool, side), tool.tip - tool.entry, side)
         for first, last in held(follows, side):
             found = _grip(xy, seen, touched, at_jaws, tool, follows, (first, last), side, cell)

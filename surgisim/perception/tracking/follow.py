@@ -15,8 +15,9 @@ from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.tracking import Tracking
 from surgisim.perception.grasp.carry import carry
-from surgisim.perception.grasp.contact import contact, frame_flow
+from surgisim.perception.grasp.contact import frame_flow
 from surgisim.perception.grasp.find import LIKELY, Grip, find
+from surgisim.perception.grasp.following import jaw_motion
 from surgisim.perception.grasp.given import given
 from surgisim.perception.grasp.instruments import instruments, nearest
 from surgisim.perception.grasp.say import advice, whose
@@ -63,8 +64,8 @@ def follow(
         seen = find(xy, paths.visible, tools, flow, side, cell)
         grips = sorted((g for g in seen if g.confidence >= LIKELY), key=lambda g: g.begin)
     holders = [g.instrument if g.instrument >= 0 else nearest(tools, g.center, g.begin) for g in grips]
-    contacts = [contact(flow, tools[h].mask, paths.xy) if h is not None else None for h in holders]
-    motion = carry(grips, paths, contacts, depth, camera, source)
+    jaws = [jaw_motion(flow, tools[h], side) if h is not None else None for h in holders]
+    motion = carry(grips, paths, jaws, depth, camera, source)
     _say(motion, camera, settings, [whose(tools, grip) for grip in grips], advice(seen, tools, camera))
     keep = _choose(queries, usable, grips, settings)
     if not keep.any():
