@@ -10,6 +10,7 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.frames import USED
 from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
+from surgisim.estimation.brightness import Brightness
 from surgisim.mpm.simulator import Simulator
 from surgisim.problem import Problem
 
@@ -87,6 +88,12 @@ class Filmed(Observation):
     camera: Camera
     pixels: np.ndarray
     """Where they were seen [px], (K, T, 2), zero where not."""
+    light: Brightness | None = None
+    """How bright they looked; none where that is left aside."""
+
+    def carried_by(self, simulator: Simulator) -> Self:
+        light = self.light.carried_by(simulator) if self.light else None
+        return replace(super().carried_by(simulator), light=light)
 
     def apart(self, moved: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Across the view at the depth of frame 0, and along it [m], (K, len(frames), 3)."""
@@ -110,8 +117,7 @@ def observe(tracks: Tracks, motion: Motion, camera: Camera, simulator: Simulator
     rest = tracks.xyz[:, 0].astype(float)
     usable = np.isfinite(rest).all(1) & tracks.visible[:, 0]
     carry = simulator.carry(np.where(usable[:, None], rest, simulator.rest[0]))
-    support = np.asarray(carry.sum(1)).ravel()
-    usable &= abs(support - 1) < 0.05
+    usable &= abs(simulator.support(carry) - 1) < 0.05
     for j in range(len(motion.radius)):
         usable &= np.linalg.norm(rest - motion.center_rest[j], axis=1) > motion.radius[j]
     if usable.sum() < 10:
