@@ -12,6 +12,9 @@ OPEN_TOLD = 0.5
 """The same of what is open beside the laws, whose priors are narrow."""
 RESTS = 0.2
 """Share of a quantity's variance from which on what was taken for granted is named."""
+FREE, FREELY = "release", 0.5
+"""The phase in which no grip drives the tissue, and the least share of a modulus's or a viscosity's information that must
+come from there: while tissue is driven, an error of the grip's path in time looks like either."""
 TOLD = 0.1
 """A number counts as told by the clip when its posterior spread is at most this share of the prior's: a modulus to
 about 25 % either way (90 %), Poisson's ratio to about .02."""
@@ -58,6 +61,8 @@ def identifiability(
         edge = _at_edge(search, solution.x, direction)
         owed = {n: float(direction @ c @ direction) / sd**2 for n, c in model.items()}
         told = sd <= (OPEN_TOLD if name in {u.name for u in search.open} else TOLD) * prior and not edge
+        if ".E" in name or ".eta" in name:
+            told = told and total > 0 and by_phase.get(FREE, 0.0) > FREELY * total
         result[name] = {
             "value": float(value),
             "low": float(low),

@@ -9,14 +9,14 @@ from surgisim.estimation.search import search
 from surgisim.estimation.support import Support
 
 
-def told(model=None):
+def told(model=None, phase="release"):
     """The table of a fit whose residuals tell every parameter to a hundredth of its search space."""
     wanted = search(["corotated", "newtonian"], {}, [])
     slope = np.vstack([100 * np.eye(3)] * 50)
     solution = Solution(wanted.start, np.full(len(slope), 0.5), slope)
-    phase = np.zeros(len(slope), int)
+    one = np.zeros(len(slope), int)
     return identifiability(
-        solution, wanted, phase_of=phase, phase_names=("load",), density=1050.0, length=0.015, independent=0.02,
+        solution, wanted, phase_of=one, phase_names=(phase,), density=1050.0, length=0.015, independent=0.02,
         region=np.repeat(np.arange(10), 15), model=model,
     )  # fmt: skip
 
@@ -59,3 +59,11 @@ def test_where_regions_agree_intervals_are_those_of_the_noise_and_where_they_do_
     wide = np.sqrt(np.diag(regional(J, apart, share, spread, region)) / np.diag(plain))
     assert wide[0] > 2.5
     assert wide[1:].max() < 2
+
+
+def test_no_viscosity_is_told_by_tissue_that_is_driven_all_the_time():
+    free, driven = told(), told(phase="load")
+    for name in ("corotated.E", "newtonian.eta", "newtonian.eta / corotated.E"):
+        assert free[name]["told"]
+        assert not driven[name]["told"]
+    assert driven["corotated.nu"]["told"]
