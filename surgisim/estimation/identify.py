@@ -13,7 +13,7 @@ OPEN_TOLD = 0.5
 RESTS = 0.2
 """Share of a quantity's variance from which on what was taken for granted is named."""
 FREE, FREELY = "release", 0.5
-"""The phase in which no grip drives the tissue, and the least share of a modulus's or a viscosity's information that must
+"""The phase in which no grip drives the tissue, and the least share of the information on E or eta that must
 come from there: while tissue is driven, an error of the grip's path in time looks like either."""
 TOLD = 0.1
 """A number counts as told by the clip when its posterior spread is at most this share of the prior's: a modulus to
