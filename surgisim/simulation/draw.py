@@ -1,6 +1,7 @@
 """Pictures of a moved body: every splat is carried, turned and stretched by the simulation."""
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -16,6 +17,13 @@ COVERED = 0.9
 """Opacity of the surface from which nothing behind it shows: the scene was fitted before black."""
 Shade = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Colours, sRGB (G, 3), of splats at moved means [m], (G, 3), with deformation gradients (G, 3, 3)."""
+
+
+class Light(Protocol):
+    """What lights the splats."""
+
+    def shade(self, rest: np.ndarray, color: np.ndarray) -> Shade:
+        """How splats at rest [m], (G, 3), of a colour, sRGB (G, 3), look once they are moved."""
 
 
 class Carried:
@@ -52,28 +60,31 @@ class Splats:
 
 
 class Drawn:
-    """The scene, and behind it, where it opens, the body's interior."""
+    """The scene, and behind it, where it opens, the body's interior and what lies beyond the picture's edge."""
 
-    def __init__(self, scene: Scene, body: Body, simulator: Nodes, interior: bool, light=None) -> None:
-        """light: `simulation.relight.Light`, or None to leave every colour as the rest frame has it."""
-        shade = (lambda rest, color: None) if light is None else light.shade
-        surface = drawn(scene)
-        self.surface = Splats(*surface, simulator, shade(surface[0], surface[-1]))
-        inside = ~body.surface
-        self.interior = None
-        if interior and inside.any():
-            count = int(inside.sum())
-            radius = 0.5 * np.cbrt(body.volume[inside].astype(float))
-            still = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
-            radii, opacity = np.repeat(radius[:, None], 3, 1), np.full(count, 0.95)
-            rest, color = body.rest[inside], body.color[inside]
-            self.interior = Splats(rest, still, radii, opacity, color, simulator, shade(rest, color))
+    def __init__(
+        self, scene: Scene, rim: Scene, body: Body, simulator: Nodes, interior: bool, light: Light | None = None
+    ) -> None:
+        """rim: see `gaussians.rim`; light: None leaves every colour as the rest frame has it."""
+        shade = (lambda mean, color: None) if light is None else light.shade
+        front, behind = drawn(scene), drawn(rim)
+        if interior:
+            behind = [np.concatenate(pair) for pair in zip(behind, _inside(body), strict=True)]
+        self.front, self.behind = (Splats(*s, simulator, shade(s[0], s[-1])) for s in (front, behind))
 
     def picture(self, u: np.ndarray, camera: Camera) -> np.ndarray:
         """The frame at displacements of the solid nodes [m], (A, 3), as (H, W, 3) uint8."""
-        front = self.surface.seen(u, camera)
-        if self.interior is None or front.alpha.min() >= COVERED:
+        front = self.front.seen(u, camera)
+        if front.alpha.min() >= COVERED:
             return to_bytes(front.rgb)
-        behind = self.interior.seen(u, camera)
         gap = np.maximum(0.0, 1 - front.alpha / COVERED)[..., None]
-        return to_bytes(front.rgb + gap * behind.rgb)
+        return to_bytes(front.rgb + gap * self.behind.seen(u, camera).rgb)
+
+
+def _inside(body: Body) -> tuple[np.ndarray, ...]:
+    """The particles behind the surface as round splats: mean, rotation, scale, opacity and colour."""
+    inside = ~body.surface
+    count = int(inside.sum())
+    radius = 0.5 * np.cbrt(body.volume[inside].astype(float))
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
+    return body.rest[inside], still, np.repeat(radius[:, None], 3, 1), np.full(count, 0.95), body.color[inside]

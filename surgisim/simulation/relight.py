@@ -143,7 +143,7 @@ def _with_highlights(plain: Light, rest, z, simulator, used, frames, masks) -> L
     column, row = pixels.astype(int).T
     diffuse[row[often], column[often]] = np.nanmedian(colors[often], 1)
     own = np.minimum(diffuse[row, column], rest[row, column])
-    error = np.zeros(len(LOBES))
+    error = np.zeros((len(LOBES), len(used)))
     for k, (t, _) in enumerate(used):
         at = np.rint(way.pixels[k]).astype(int)
         inside = ((at >= 0) & (at < [plain.camera.width, plain.camera.height])).all(-1)
@@ -153,7 +153,7 @@ def _with_highlights(plain: Light, rest, z, simulator, used, frames, masks) -> L
         for n, lobe in enumerate(LOBES):
             left = share_left(way.rest, way.moved[k], way.F[k], lobe)
             drawn = to_srgb(own * np.exp(change[:, k, None]) + shine * left[:, None])
-            error[n] += ((np.minimum(drawn, 1.0) - frames.rgb[t, y, x] / 255)[here] ** 2).sum()
+            error[n, k] = ((np.minimum(drawn, 1.0) - frames.rgb[t, y, x] / 255)[here] ** 2).sum()
     return Light(
         plain.camera, plain.normals, diffuse, plain.glint, plain.strength, plain.ambient, choose_lobe(error)
     )

@@ -14,6 +14,7 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.replay import Replay
 from surgisim.artifacts.scene import Scene
 from surgisim.config.simulation import Simulation
+from surgisim.gaussians.rim import beyond
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import SKIN, Prepared, checked_per_frame, prepare, theta_of, values_of
 from surgisim.mpm.simulator import Run, Simulator
@@ -57,7 +58,8 @@ def replay(
         else plan(settings.operation, body.rest, body.surface, camera, body.spacing)
     )
     per_frame = checked_per_frame(physics, material, camera.fps) * settings.refine_step
-    parts = _parts(body, scene, physics, task, settings.device)
+    rim = beyond(scene, camera)
+    parts = _parts(body, [scene, rim], physics, task, settings.device)
     path = _path(parts[0], task, physics, material, camera, per_frame)
     states, whole = _march([p.simulator for p in parts], theta, path, task, lambda d, t, s: progress(0.5 * d, t, s))
     frames = len(path.path[0]) // per_frame + 1
@@ -76,7 +78,7 @@ def replay(
         simulator, run, k = states[t]
         key = id(simulator)
         if key not in looks:
-            looks[key] = _Look(simulator, body, scene, settings, physics, theta, light)
+            looks[key] = _Look(simulator, body, (scene, rim), settings, physics, theta, light)
         moved, least, joules = looks[key].measure(run.u[k], run.v[k])
         position.append(moved.astype(np.float32))
         nodes.append(simulator.displaced(run.u[k])[: simulator.grid.count].astype(np.float32))
@@ -123,13 +125,13 @@ def _path(
     return path
 
 
-def _parts(body: Body, scene: Scene, physics: Physics, task: Plan, device: str) -> list[Prepared]:
+def _parts(body: Body, scenes: list[Scene], physics: Physics, task: Plan, device: str) -> list[Prepared]:
     """The whole body and, when something is cut, the cut one."""
     make = [None] if task.cut is None else [None, task.cut]
     return [
         prepare(
             body, tuple(physics.terms), density=physics.density, gravity=tuple(physics.gravity),
-            carried=scene.mean.astype(float), cut=cut, device=device, form=physics.form, threads=THREADS,
+            carried=np.concatenate([s.mean for s in scenes]).astype(float), cut=cut, device=device, form=physics.form, threads=THREADS,
             grips=task.motion,
             skin=SKIN,
         )
@@ -159,7 +161,7 @@ class _Look:
         self,
         simulator: Simulator,
         body: Body,
-        scene: Scene,
+        scenes: tuple[Scene, Scene],
         settings: Simulation,
         physics: Physics,
         theta: np.ndarray,
@@ -176,7 +178,7 @@ class _Look:
             if term.energy:
                 self.laws.append((term.energy, values))
         if settings.render:
-            self.drawn = Drawn(scene, body, simulator, settings.interior, light)
+            self.drawn = Drawn(*scenes, body, simulator, settings.interior, light)
 
     def measure(self, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, float, tuple[float, float]]:
         """Particle positions [m], (P, 3); smallest det F; kinetic and elastic energy [J]."""
