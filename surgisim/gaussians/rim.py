@@ -23,7 +23,7 @@ def beyond(scene: Scene, camera: Camera, width: float = WIDTH) -> Scene:
     reach = width * max(camera.width, camera.height)
     parts = []
     for side in map(np.array, product((-1, 0, 1), repeat=2)):
-        # Distance inward from the edge that the picture is mirrored at, which runs half a pixel outside of the last one.
+        # Distance inward from the mirror, half a pixel outside of the last one.
         inward = np.where(side < 0, pixels + 0.5, last + 0.5 - pixels)
         near = ((side == 0) | ((inward >= 0) & (inward < reach))).all(1) & side.any()
         mirrored = pixels + 2 * side * inward

@@ -29,14 +29,3 @@ def share_left(rest: np.ndarray, moved: np.ndarray, F: np.ndarray, lobe: float) 
     mirror = np.maximum(facing(moved, turned(F, -rest)), 0.0)
     nearer = (rest**2).sum(-1) / (moved**2).sum(-1)
     return mirror**lobe * nearer
-
-
-def choose_lobe(error: np.ndarray) -> float:
-    """The mildest exponent that explains as well as the best, for squared errors (L, T) in the order of `LOBES`.
-
-    As well: the sums over T frames differ by no more than one standard error of their difference (Breiman and others,
-    Classification and regression trees, 1984, section 3.4.3), so that noise alone lets no highlight fade.
-    """
-    more = error - error[np.argmin(error.sum(1))]
-    slack = more.std(1) * np.sqrt(error.shape[1])
-    return LOBES[int(np.argmax(more.sum(1) <= slack))]

@@ -56,3 +56,14 @@ def fit_strength(predicted: np.ndarray, recorded: np.ndarray, seen: np.ndarray, 
     gain = np.where(total > 0, (np.bincount(t, weight * (y - slope * x), frames)) / here, np.nan)
     value = slope * max(0.0, 1 - (error / slope) ** 2) if slope > 0 else 0.0
     return Strength(float(value), float(slope), error, gain, float(size))
+
+
+def mildest(choices: tuple[float, ...], error: np.ndarray) -> float:
+    """The first of `choices`, mildest first, that explains as well as the best, for squared errors (L, T).
+
+    As well: the sums over T frames differ by no more than one standard error of their difference (Breiman and others,
+    Classification and regression trees, 1984, section 3.4.3), so that noise alone changes nothing.
+    """
+    more = error - error[np.argmin(error.sum(1))]
+    slack = more.std(1) * np.sqrt(error.shape[1])
+    return choices[int(np.argmax(more.sum(1) <= slack))]

@@ -11,15 +11,17 @@ from surgisim.artifacts.masks import Masks
 from surgisim.artifacts.scene import Scene
 from surgisim.gaussians.surface import surface_of
 from surgisim.lighting.headlight import log_brightness_change, to_linear, to_srgb
-from surgisim.lighting.highlights import LOBES, choose_lobe, share_left, without
+from surgisim.lighting.highlights import LOBES, share_left, without
 from surgisim.lighting.normals import at_pixels, rest_normals, turned
 from surgisim.lighting.recorded import beside, shown
-from surgisim.lighting.strength import Strength, fit_strength
+from surgisim.lighting.strength import Strength, fit_strength, mildest
 from surgisim.mpm.nodes import Nodes
 from surgisim.simulation.draw import Carried, Shade
 
 AMBIENT = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
 """Ambient shares to choose from; 1 leaves the fall over distance alone [1]."""
+BLUR = 0.25
+"""Blur with which brightness is read along the way of the surface [grid spacing]."""
 PATCH = 4.0
 """Side of the patches whose errors go together [grid spacing]."""
 SHARP = 0.7
@@ -94,7 +96,7 @@ def find_light(
     used = [(t, u) for t, u in enumerate(states) if t < len(frames.split) and frames.split[t] == USED]
     pixels = _grid(masks.tissue[0], max(cell / 2, 1.0))
     way = _Way(pixels, surface.z, normals, camera, simulator, used)
-    light = [shown(t, at, frames, masks, cell / 2) for (t, _), at in zip(used, way.pixels, strict=True)]
+    light = [shown(t, at, frames, masks, BLUR * cell) for (t, _), at in zip(used, way.pixels, strict=True)]
     start = light[0]
     recorded = np.stack([np.log(np.maximum(a, 1e-6)).mean(-1) for a, _ in light], 1)
     recorded = recorded - np.log(np.maximum(start[0], 1e-6)).mean(-1)[:, None]
@@ -155,7 +157,7 @@ def _with_highlights(plain: Light, rest, z, simulator, used, frames, masks) -> L
             drawn = to_srgb(own * np.exp(change[:, k, None]) + shine * left[:, None])
             error[n, k] = ((np.minimum(drawn, 1.0) - frames.rgb[t, y, x] / 255)[here] ** 2).sum()
     return Light(
-        plain.camera, plain.normals, diffuse, plain.glint, plain.strength, plain.ambient, choose_lobe(error)
+        plain.camera, plain.normals, diffuse, plain.glint, plain.strength, plain.ambient, mildest(LOBES, error)
     )
 
 

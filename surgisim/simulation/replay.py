@@ -106,9 +106,7 @@ def _recorded(motion: Motion, camera: Camera) -> Plan:
     return Plan(motion, np.zeros((camera.frames, 3)), None, 0)
 
 
-def _path(
-    made: Prepared, task: Plan, physics: Physics, material: Material, camera: Camera, per_frame: int
-) -> Drive:
+def _path(made: Prepared, task: Plan, physics: Physics, material: Material, camera: Camera, per_frame: int) -> Drive:
     """The boundary condition of a task at every step."""
     path = made.drive(
         task.motion,
@@ -127,11 +125,12 @@ def _path(
 
 def _parts(body: Body, scenes: list[Scene], physics: Physics, task: Plan, device: str) -> list[Prepared]:
     """The whole body and, when something is cut, the cut one."""
+    carried = np.concatenate([s.mean for s in scenes]).astype(float)
     make = [None] if task.cut is None else [None, task.cut]
     return [
         prepare(
             body, tuple(physics.terms), density=physics.density, gravity=tuple(physics.gravity),
-            carried=np.concatenate([s.mean for s in scenes]).astype(float), cut=cut, device=device, form=physics.form, threads=THREADS,
+            carried=carried, cut=cut, device=device, form=physics.form, threads=THREADS,
             grips=task.motion,
             skin=SKIN,
         )
