@@ -21,7 +21,8 @@ def facing(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
 def log_brightness(points: np.ndarray, normals: np.ndarray, ambient: float = 0.0) -> np.ndarray:
     """Natural logarithm of linear light over albedo, (...), of surface points.
 
-    points: camera frame [m], (..., 3). Normals (..., 3) have any length and point out of the tissue. ambient: 0-1; at 0 a surface turned away is black (-inf).
+    points: camera frame [m], (..., 3); normals: any length, out of the tissue, (..., 3). ambient: 0-1; at 0 a surface
+    turned away is black (-inf).
     """
     lit = ambient + (1 - ambient) * np.maximum(facing(points, normals), 0.0)
     with np.errstate(divide="ignore"):

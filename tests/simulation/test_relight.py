@@ -14,7 +14,7 @@ from surgisim.gaussians.rim import beyond
 from surgisim.lighting.highlights import without
 from surgisim.lighting.strength import Strength
 from surgisim.mpm.setup import SKIN, prepare
-from surgisim.simulation.draw import Drawn
+from surgisim.simulation.draw import Carried, Drawn
 from surgisim.simulation.relight import Light, find_light
 
 FRAMES = 14
@@ -114,3 +114,13 @@ def test_what_lies_beyond_the_picture_is_lit_as_its_edge(played):
     more = beyond(scene, CAMERA)
     shade = light(glint=SPECK & False).shade(more.mean, more.color)
     assert np.isfinite(shade(more.mean * 0.9, np.tile(np.eye(3), (len(more.mean), 1, 1)))).all()
+
+
+def test_what_is_gripped_is_drawn_where_the_simulation_has_it(played):
+    simulator, states, _ = played
+    near = BODY.rest[np.linalg.norm(BODY.rest - [0, 0, 0.06], axis=1) < 0.004].astype(float)
+    drawn = Carried(near, simulator).at(states[8])[0]
+    assert np.allclose(drawn, near + simulator.carry(near) @ states[8], atol=1e-9)
+    nodes, weight, _ = simulator.stencil(near)
+    without_bend = near + np.einsum("qk,qka->qa", weight, simulator.displaced(states[8])[nodes])
+    assert np.abs(drawn - without_bend).max() > 1e-4
