@@ -37,7 +37,8 @@ def test_variants_share_what_they_do_not_change(tree):
         made.setdefault(stage, set()).add(where[-1] if where else "")
     assert made["masking"] == made["depth"] == made["tracking"] == {"main"}
     assert made["reconstruction"] == {"main", "no_trajectory", "no_anisotropy", "no_both"}
-    assert made["estimation"] == set(VARIANTS)
+    assert made["estimation"] == set(VARIANTS) - {"no_relight"}
+    assert made["simulation"] == set(VARIANTS)
     assert made["evaluation"] == made["report"] == set(VARIANTS)
 
 

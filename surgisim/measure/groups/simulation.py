@@ -12,6 +12,7 @@ from surgisim.measure.groups.depth import scale_to_truth
 from surgisim.measure.groups.masking import NO_TRUTH
 from surgisim.measure.groups.pictures import WHEN, pictures
 from surgisim.measure.groups.reconstruction import table
+from surgisim.measure.groups.replay_pictures import replay_pictures
 from surgisim.measure.lpips import Lpips
 from surgisim.measure.number import number
 from surgisim.measure.phases import phases
@@ -38,7 +39,7 @@ def simulation(run: Run, lpips: Lpips | None) -> dict[str, dict[str, Any]]:
         return _stated(run) | {"tracked_held_out": number(None, run.length_unit, "", why_not=why_not)}
     numbers = _tracked(run) | _true(run) | _stated(run)
     if len(run.replay.rgb) == len(run.frames.rgb):
-        numbers |= table(pictures(run.replay.rgb, run, lpips), run, WHEN)
+        numbers |= table(pictures(run.replay.rgb, run, lpips), run, WHEN) | replay_pictures(run)
     else:
         numbers["psnr_between"] = number(None, "dB", "", why_not="the replay was not rendered frame by frame")
     return numbers
