@@ -63,7 +63,9 @@ def identifiability(
             "told": bool(told),
             "at_edge": edge,
             "rests_on": {
-                n: round(float(share), 3) for n, c in model.items() if (share := direction @ c @ direction / sd**2) > RESTS
+                n: round(float(share), 3)
+                for n, c in model.items()
+                if (share := direction @ c @ direction / sd**2) > RESTS
             },
             "phases": {n: round(v / total, 3) if total > 0 else 0.0 for n, v in by_phase.items()},
         }

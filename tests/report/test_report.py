@@ -26,7 +26,7 @@ from surgisim.report.views import balls, look
 
 COST = {"masking": {"seconds": 12.5, "peak_mb": 345.0}, "depth": {"seconds": 3.0}}
 LOST = Motion(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 12, 3)), np.zeros((0, 12), bool), np.zeros(0), "none")
-NAMES = [f.name for f in dataclasses.fields(Run) if f.name != "truth"]
+NAMES = [f.name for f in dataclasses.fields(Run) if f.name not in ("truth", "found")]
 
 
 def story(made, **changed) -> Story:
