@@ -15,8 +15,8 @@ SPANS = {"load": ("load",), "hold": ("hold",), "released": ("release",), "pull":
 def by_phase(default: np.ndarray, fitted: np.ndarray, phase: np.ndarray) -> dict[str, dict[str, Any]]:
     """Span -> "default", "fitted" [m], and "share", the one over the other [1]: value, low, high, count of points.
 
-    default, fitted: distance of each point in each frame [m], (K, F), NaN where it does not count, the same in both; phase: index into
-    PHASES of those frames, (F,).
+    default, fitted: distance of each point in each frame [m], (K, F), NaN where it does not count, the same in both;
+    phase: index into PHASES of those frames, (F,).
     """
     found = {}
     for span, names in SPANS.items():

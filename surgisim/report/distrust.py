@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surgisim.report.headline import shown
+from surgisim.report.digits import shown
 from surgisim.report.story import Story
 
 

@@ -17,8 +17,9 @@ from surgisim.measure.score import score
 from surgisim.measure.truth_seen import seen
 from surgisim.report.across import page as summary
 from surgisim.report.across import table
+from surgisim.report.digits import shown
 from surgisim.report.distrust import distrust
-from surgisim.report.headline import headline, shown
+from surgisim.report.headline import headline
 from surgisim.report.moments import moments
 from surgisim.report.page import page
 from surgisim.report.story import Story
