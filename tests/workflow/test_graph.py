@@ -35,8 +35,9 @@ def test_variants_share_what_they_do_not_change(tree):
     made = {}
     for stage, *where in tree.plan():
         made.setdefault(stage, set()).add(where[-1] if where else "")
-    assert made["masking"] == made["depth"] == made["tracking"] == {"main"}
-    assert made["reconstruction"] == {"main", "no_trajectory", "no_anisotropy", "no_both"}
+    assert made["masking"] == made["inpainting"] == {"main"}
+    assert made["depth"] == made["tracking"] == {"main", "near_light"}
+    assert made["reconstruction"] == {"main", "no_trajectory", "no_anisotropy", "no_both", "near_light"}
     assert made["estimation"] == set(VARIANTS)
     assert made["evaluation"] == made["report"] == set(VARIANTS)
 
