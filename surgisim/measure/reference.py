@@ -43,6 +43,8 @@ def tracked(run: Run) -> Reference:
     tracks, camera = run.tracks, run.camera
     rest = np.where(tracks.visible[:, :1], tracks.xyz[:, 0], np.nan)
     what = "visible tracks (themselves estimated), each carried by the replay from its place in frame 0"
+    if not run.depth.follows:
+        what += "; their way along the view is a guess from brightness, no measurement"
     return Reference(
         "tracked", what, rest, tracks.xyz, tracks.xy, tracks.visible, run.motion, (camera.fx, camera.fy),
         run.length_unit,
