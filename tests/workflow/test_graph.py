@@ -143,7 +143,16 @@ def test_a_mistake_in_the_config_is_one_sentence(tree):
 
 CONCEALED = {"invent", "seals", "shuffle", "shorten", "diagnosis", "diagnosis_report", "score", "scoreboard", "pooled"}
 CONCEALED |= {"robustness", "metamorphic", "perturb", "draws", "draw", "self_consistency"}
-CONCEALED |= {"interval_coverage", "known", "known_direct", "known_score", "known_board", "ablations", "recorded"}
+CONCEALED |= {
+    "interval_coverage",
+    "clip_table",
+    "known",
+    "known_direct",
+    "known_score",
+    "known_board",
+    "ablations",
+    "recorded",
+}
 AGAIN = {
     "verification",
     "verification_case",
@@ -156,7 +165,7 @@ AGAIN = {
 }
 """Rules that run the module of another's name."""
 ASKED_FOR = {"blind", "blind_shuffled", "blind_ablations", "blind_phases", "blind_pooled", "blind_real"}
-ASKED_FOR |= {"clip_diagnoses", "coverage"}
+ASKED_FOR |= {"clip_diagnoses", "coverage", "real_clips"}
 TAKEN_OVER = {"body", "body_again"}
 """The rule `invent` with other files: bodies whose answers are known to whoever develops."""
 """Rules without a stage of their own: what `snakemake NAME` makes."""
