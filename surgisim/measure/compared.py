@@ -41,7 +41,7 @@ def compared(run: Run, to: Reference) -> Compared:
     wanted, wanted_px = from_start(to.xyz), from_start(to.xy)
     counted = to.visible & on_body[:, None] & np.isfinite(wanted).all(-1)
     counted[:, 0] = False
-    lively = moving(wanted, counted, on_body)
+    lively = moving(from_start(to.way), counted, on_body)
     rigid = with_grip(to.motion, to.xyz[:, 0].astype(float))
     return Compared(
         wanted, wanted_px, to.scale * from_start(path), from_start(pixels), rigid, _in_picture(rigid, to), counted,

@@ -33,6 +33,12 @@ class Reference:
     """Factor from the run's lengths to the reference's [1]."""
 
     @property
+    def way(self) -> np.ndarray:
+        """The paths by which it is told whether a point moves, (K, T, 3) [m] or (K, T, 2) [px]."""
+        # A track's depth is estimated, and another one would call other points moving.
+        return self.xyz if self.name == "true" else self.xy
+
+    @property
     def phase(self) -> np.ndarray:
         """(T,) str."""
         return phases(self.motion)

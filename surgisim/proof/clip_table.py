@@ -75,7 +75,7 @@ def _row(clip: str, runs: dict[str, Metrics]) -> dict[str, Any]:
         "best": min(known, key=lambda name: known[name]["value"]) if known else None,
         "surely_best": _surely(ours, [e for name, e in known.items() if name != "ours"]) if ours else None,
         "changed": {v: e | {"change": e["value"] - ours["value"]} for v, e in others.items()} if ours else {},
-        "causes": _causes(runs[MAIN]),
+        "causes": _causes(runs[MAIN], against),
     }
 
 
@@ -95,17 +95,16 @@ CAUSES = (
     ("depth", "depth", f"given_change_{SPAN}_share", "change of depth off the given one"),
     ("grip", "grasp", f"path_fitted_{SPAN}_share", "path off the true one"),
     ("grip", "grasp", "center", "place off the true one"),
-    ("body", "simulation", "true_moving_on_body", "share of moving points that the body has"),
-    ("body", "simulation", "tracked_moving_on_body", "share of moving points that the body has"),
+    ("body", "simulation", "{against}_moving_on_body", "share of moving points that the body has"),
 )
 
 
-def _causes(run: Metrics) -> list[dict[str, Any]]:
+def _causes(run: Metrics, against: str) -> list[dict[str, Any]]:
     """How far off each part is that the replay rests on, where that is known."""
     return [
         {"part": part, "words": words, **{key: e.get(key) for key in ("value", "low", "high", "unit")}}
         for part, group, name, words in CAUSES
-        if (e := run.values.get(group, {}).get(name))
+        if (e := run.values.get(group, {}).get(name.format(against=against)))
     ]
 
 
@@ -119,7 +118,7 @@ def in_words(table: dict[str, Any]) -> str:
         cells = [_text(row[name]) for name in ("still", "rigid", "default", "ours")] + [_text(row["of_still"], "%")]
         lines.append(f"  {row['clip']:16s}" + "".join(f"{c:>20s}" for c in cells) + f"   best: {row['best']}")
         lines += [f"    {v}: {_text(e)} ({e['change']:+.3g})" for v, e in row["changed"].items()]
-        lines += [f"    {c['part']}, {c['words']}: {_text(c)} {c['unit'].replace('1', '')}" for c in row["causes"]]
+        lines += [f"    {c['part']}, {c['words']}: {_text(c)}{_unit(c)}" for c in row["causes"]]
     for words, m in table["medians"].items():
         ends = f" [{m['low']:.3g}-{m['high']:.3g}]" if m["low"] is not None else ""
         lines.append(f"median of {m['count']} clips, {words}: {m['value']:.3g}{ends}")
@@ -132,6 +131,10 @@ def verdict(table: dict[str, Any]) -> str:
         f"{table['surely_best']}), and all of its interval at most {table['goal_of_still']:.0f} % of still in "
         f"{table['within_goal']}, of which {table['enough']} are wanted"
     )
+
+
+def _unit(entry: dict[str, Any]) -> str:
+    return "" if entry["unit"] == "1" else f" {entry['unit']}"
 
 
 def _text(entry: dict[str, Any] | None, unit: str = "") -> str:

@@ -12,6 +12,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -77,6 +78,10 @@ REPLACED: dict[str, Callable[[Path, TruthSeen, float], None]] = {
 }
 
 
+ALONG = {"grip": {"estimation": {"carrying": False}}}
+"""What else changes: a fit would lay the true path flat again, and look for how far it comes nearer by itself."""
+
+
 def reveal(out: Path, clip: str, what: str, cores: str) -> Path:
     """Run the graph on with the truth in one place; where its metrics lie."""
     home = out / "results" / clip / "main"
@@ -92,7 +97,7 @@ def reveal(out: Path, clip: str, what: str, cores: str) -> Path:
     truth, depth = seen(load(Truth, run / "phantom" / "truth.npz"), camera), load(Depth, run / "depth" / "depth.npz")
     scale = 1.0 if depth.scale == "known" else scale_between(depth.z, truth.depth, ~truth.tool)
     REPLACED[what](run, truth, scale)
-    written = _same_settings(out, place)
+    written = _settings(out, place, ALONG.get(what, {}))
     metrics = Path("results") / clip / "main" / "evaluation" / "metrics.json"
     arguments = ["--configfile", str(written), "--cores", cores, "--rerun-triggers", "mtime", "--", str(metrics)]
     with follower(Console(stderr=True), quiet=False) as show:
@@ -107,14 +112,14 @@ def reveal(out: Path, clip: str, what: str, cores: str) -> Path:
     return kept
 
 
-def _same_settings(out: Path, place: Path) -> Path:
-    """The run's own settings, of its main variant only."""
+def _settings(out: Path, place: Path, changes: dict[str, Any]) -> Path:
+    """The run's own settings with those changes, of its main variant only."""
     choices = yaml.safe_load((out / "results" / "run.yaml").read_text())
     for name in ("clips", "variants"):
         shutil.copy2(choices[name], place / "results" / Path(choices[name]).name)
         choices[name] = str((place / "results" / Path(choices[name]).name).resolve())
     written = place / "results" / "run.yaml"
-    written.write_text(yaml.safe_dump(merged(choices, {"run": ["main"]})))
+    written.write_text(yaml.safe_dump(merged(choices, changes | {"run": ["main"]})))
     return written
 
 

@@ -92,6 +92,20 @@ def test_a_path_that_stays_at_its_depth_is_off_by_how_near_it_came(made):
     assert entries["path_found_hold_along_share"]["value"] == pytest.approx(wanted, rel=0.05)
 
 
+def test_a_guessed_depth_neither_chooses_the_points_nor_counts_in_space(made):
+    rng = np.random.default_rng(0)
+    noise = np.zeros_like(made["tracks"].xyz)
+    noise[..., 2] = rng.normal(0, 0.02, noise.shape[:2])
+    noise[:, 0] = 0
+    guessed = dataclasses.replace(made["tracks"], xyz=made["tracks"].xyz + noise)
+    depth = dataclasses.replace(made["depth"], follows=False)
+    entries = simulation_by_phase(run_of(made, tracks=guessed, depth=depth))
+    name = "tracked_held_out_hold_moving_of_still_px"
+    assert entries[name] == simulation_by_phase(run_of(made, depth=depth))[name]
+    assert "tracked_held_out_hold_moving" not in entries
+    assert entries["tracked_held_out_pull_moving"]["value"] is None
+
+
 def test_points_that_the_body_has_not_are_told(made):
     far = dataclasses.replace(made["body"], rest=made["body"].rest + np.float32(1.0))
     entries = simulation_by_phase(run_of(made, body=far))

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from surgisim.artifacts.frames import USED
-from surgisim.measure.compared import OF_MOVING, Compared, compared, moving
+from surgisim.measure.compared import OF_MOVING, Compared, compared, from_start, moving
 from surgisim.measure.number import number, ranged
 from surgisim.measure.reference import Reference, tracked, true
 from surgisim.measure.resample import Estimate, ratio
@@ -32,13 +32,16 @@ def _held_out(run: Run, to: Reference) -> dict[str, dict[str, Any]]:
     by = compared(run, to)
     numbers = {f"{to.name}_moving_on_body": _covered(by, to)}
     held_out = run.frames.split != USED
+    views = [("_px", _apart(by.wanted_px, by.ours_px, by.rigid_px), "px", 1.0)]
+    if to.name == "true" or run.depth.follows:
+        views.insert(0, ("", _apart(by.wanted, by.ours, by.rigid), to.unit, 1e3))
+    else:
+        why_not = "the way of tracks along the view is a guess from brightness, so none is known in space"
+        numbers[f"{to.name}_held_out_pull_moving"] = number(None, to.unit, "", why_not=why_not)
     for span, (_, words) in SPANS.items():
         here = by.counted & by.lively & held_out & within(to.phase, span)
         how = f"of {OF_MOVING}, frames never used in the fit {words}, {to.what}"
-        for view, apart, unit, factor in (
-            ("", _apart(by.wanted, by.ours, by.rigid), to.unit, 1e3),
-            ("_px", _apart(by.wanted_px, by.ours_px, by.rigid_px), "px", 1.0),
-        ):
+        for view, apart, unit, factor in views:
             summed = {name: np.where(here, each, 0).sum(1) for name, each in apart.items()}
             start, seen = f"{to.name}_held_out_{span}_moving", here.sum(1)
             why_not = f"no moving point is seen in a frame never used {words}"
@@ -64,7 +67,7 @@ def _apart(wanted: np.ndarray, ours: np.ndarray, rigid: np.ndarray) -> dict[str,
 def _covered(by: Compared, to: Reference) -> dict[str, Any]:
     """Points that the body has not are in no error, so how many of those that matter it has."""
     seen = to.visible & np.isfinite(by.wanted).all(-1)
-    lively = moving(by.wanted, seen, seen.any(1))[:, 0]
+    lively = moving(from_start(to.way), seen, seen.any(1))[:, 0]
     share = by.on_body[lively].mean() if lively.any() else None
     return number(share, "1", f"share within the body of {OF_MOVING}: {to.what}", why_not="no point moves")
 
