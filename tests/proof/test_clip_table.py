@@ -35,6 +35,13 @@ def test_ours_is_the_best_only_where_it_is():
     assert clips(table).startswith(b"\x89PNG")
 
 
+def test_the_best_default_is_the_one_to_beat():
+    runs = [run("a", "main", 3.0), run("a", "elastic_default", 6.0), run("a", "no_estimation", 2.5)]
+    (row,) = clip_table(runs)["rows"]
+    assert (row["default_is"], row["best"]) == ("no_estimation", "default")
+    assert list(row["changed"]) == ["elastic_default"]
+
+
 def test_a_clip_without_a_number_is_a_row_all_the_same():
     table = clip_table([Metrics("lost", "main", {}, {})])
     assert table["clips"] == 1

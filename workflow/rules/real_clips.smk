@@ -1,4 +1,4 @@
-"""Replays of real clips beside simpler bodies: `snakemake real_clips --config clips=mine.tsv run='[main,elastic_default]'`."""
+"""Replays beside simpler bodies: `snakemake real_clips --config clips=mine.tsv run='[main,elastic_default,no_estimation]'`."""
 
 
 rule real_clips:
