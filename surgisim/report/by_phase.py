@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from surgisim.measure.spans import THREE
-from surgisim.report.digits import shown, spread
+from surgisim.report.digits import short, shown, spread
 from surgisim.report.goals import Goal, Mark, mark, worst
 from surgisim.report.story import Story
 
@@ -46,6 +46,6 @@ def lines(story: Story, headline: Headline) -> list[Line]:
             continue
         marks = [mark(e, goal) for n, goal in headline.judged if (e := entries.get(n.format(span=span)))]
         beside = headline.beside(lambda name, span=span: entries.get(name.format(span=span)))
-        unit = "" if entry["unit"] == "1" else f" {entry['unit'].partition(',')[0]}"
-        found.append(Line(span, shown(entry["value"]) + unit, spread(entry), beside, worst(marks)))
+        value = f"{shown(entry['value'])} {short(entry['unit'])}".strip()
+        found.append(Line(span, value, spread(entry), beside, worst(marks)))
     return found

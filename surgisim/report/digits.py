@@ -22,3 +22,8 @@ def spread(entry: dict[str, Any]) -> str:
     if entry["low"] is None or entry["high"] is None:
         return f"of {entry['count']} only"
     return f"{shown(entry['low'])} – {shown(entry['high'])}"
+
+
+def short(unit: str) -> str:
+    """A unit as there is room for it: mm* is a millimetre of arbitrary scale; nothing for what has none."""
+    return "" if unit == "1" else unit.replace("mm, arbitrary scale", "mm*")

@@ -3,7 +3,7 @@
 from typing import Any
 
 from surgisim.measure.spans import SPANS
-from surgisim.report.digits import shown, spread
+from surgisim.report.digits import short, shown, spread
 from surgisim.report.goals import RIGID, STILL, STILL_TRUE, mark
 from surgisim.report.tables_base import Cell, Table
 
@@ -67,7 +67,7 @@ def _replay(entries: dict[str, Any], kind: str, view: str, title: str) -> Table:
     for span, name in NAMES.items():
         cells = [entries.get(n) for n in _row(kind, view, span)]
         if cells[0]:
-            unit = cells[0]["unit"]
+            unit = short(cells[0]["unit"])
             points = cells[0]["protocol"].split(", of ", 1)[-1].split(", frames", 1)[0]
             marks = [mark(c, goals[k]) if k in goals and c else "" for k, c in enumerate(cells)]
             rows.append(
@@ -84,7 +84,7 @@ def _stages(values: dict[str, Any]) -> Table:
     for group, name, title in QUANTITIES:
         cells = [values.get(group, {}).get(name.format(span=span)) for span in NAMES]
         if first := next((c for c in cells if c), None):
-            unit = "" if first["unit"] == "1" else f" [{first['unit']}]"
+            unit = f" [{unit}]" if (unit := short(first["unit"])) else ""
             rows.append((title + unit, [_cell(c) for c in cells]))
     return Table("Every stage, phase by phase", ["", *NAMES.values()], rows, "90 % intervals below the values.")
 

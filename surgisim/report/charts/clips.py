@@ -11,7 +11,7 @@ from surgisim.report.palette import INK, MUTED, RECONSTRUCTION, REPLAY, STILL, T
 BODIES = (
     ("still", "still", STILL, "s"),
     ("rigid", "rigid with the grip", TOOL, "D"),
-    ("default", "elastic, default numbers", RECONSTRUCTION, "^"),
+    ("default", "default numbers", RECONSTRUCTION, "^"),
     ("ours", "ours", REPLAY, "o"),
 )
 
