@@ -92,6 +92,9 @@ def reveal(out: Path, clip: str, what: str, cores: str) -> Path:
         shutil.rmtree(place)
     # copy2 keeps the times, so that what is replaced is the newest and only what follows it runs.
     shutil.copytree(home, place / "results" / clip / "main", copy_function=shutil.copy2)
+    shutil.copytree(
+        out / "benchmarks" / clip / "main", place / "benchmarks" / clip / "main", copy_function=shutil.copy2
+    )
     run = place / "results" / clip / "main"
     camera = load(Camera, run / "ingest" / "camera.json")
     truth, depth = seen(load(Truth, run / "phantom" / "truth.npz"), camera), load(Depth, run / "depth" / "depth.npz")
