@@ -40,6 +40,7 @@ from surgisim.estimation.rounds import (
     windows,
 )  # fmt: skip
 from surgisim.estimation.search import Search, search
+from surgisim.estimation.stated import by_phase
 from surgisim.estimation.support import EDGES, Support, open_depth
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
@@ -129,6 +130,7 @@ def estimate(
     progress = _onward(progress)
     trial, run = settle_grip(trial, x, history)
     before = {name: trial.stand(x)[0].observation.error(run.u, at) for name, at in parts.items()}
+    before_each = trial.stand(x)[0].observation.each(run.u, held_out)
     if trial.laying:
         trial, x = choose_support(trial, phase, history, progress)
         trial, _ = settle_grip(trial, x, history)
@@ -156,6 +158,7 @@ def estimate(
     prepared, laid = trial.bodies[0], trial.bodies[0].body
     path = trial.drive(values, stiffest=prepared.stiffest(theta))
     after = {name: trial.observation.error(run.u, at) for name, at in parts.items()}
+    after_each = trial.observation.each(run.u, held_out)
     apart = f"held-out track error {after['held_out'] * 1e3:.3f} mm"
     progress(1.0, 1.0, f"{apart} ({before['held_out'] * 1e3:.3f} mm with default parameters)")
     if refined:
@@ -174,6 +177,7 @@ def estimate(
             "after_release_fitted": number(after["after_release"]),
             "used_default": number(before["fitted_frames"]),
             "used_fitted": number(after["fitted_frames"]),
+            "by_phase": by_phase(before_each, after_each, phase[held_out]),
             "frames": held_out.tolist(),
             "points": int(observation.moving.sum()),
             "field_kept": bool(refined.kept) if refined else False,

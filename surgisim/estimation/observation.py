@@ -68,13 +68,19 @@ class Observation:
 
     def error(self, u: np.ndarray, frames: np.ndarray) -> float:
         """Mean distance between simulated and seen points that move, at `frames` [m]; NaN if none is seen."""
-        if not len(frames):
-            return float("nan")
-        used = self.weight[:, frames] > 0
-        seen = used.any(-1) & self.moving[:, None]
-        apart = self.apart(self._simulated(u, frames), frames)
-        distance = np.linalg.norm(np.where(used, apart, 0.0), axis=-1)[seen]
+        distance = self.each(u, frames)[self._counted(frames)]
         return float(np.mean(distance)) if len(distance) else float("nan")
+
+    def each(self, u: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """Distance of every point that moves, at `frames` [m], (K, len(frames)); NaN where it does not count."""
+        if not len(frames):
+            return np.full((len(self.rest), 0), np.nan)
+        apart = np.where(self.weight[:, frames] > 0, self.apart(self._simulated(u, frames), frames), 0.0)
+        return np.where(self._counted(frames), np.linalg.norm(apart, axis=-1), np.nan)
+
+    def _counted(self, frames: np.ndarray) -> np.ndarray:
+        """Whether a point moves and is seen then, (K, len(frames)) bool."""
+        return (self.weight[:, frames] > 0).any(-1) & self.moving[:, None]
 
     def _simulated(self, u: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Displacements of the points [m], (K, len(frames), 3)."""

@@ -17,7 +17,7 @@ from surgisim.measure.score import score
 from surgisim.measure.truth_seen import seen
 from surgisim.problem import Problem
 
-NAMES = [f.name for f in dataclasses.fields(Run) if f.name != "truth"]
+NAMES = [f.name for f in dataclasses.fields(Run) if f.name not in ("truth", "found")]
 
 
 def run_of(made, **changed) -> Run:
