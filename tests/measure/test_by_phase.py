@@ -53,7 +53,8 @@ def test_a_replay_nine_tenths_as_far_is_a_tenth_of_still_in_every_phase(made):
 
 
 def test_a_still_replay_is_a_hundred_per_cent_of_still(made):
-    still = dataclasses.replace(made["replay"], nodes=0 * made["replay"].nodes)
+    stays = np.broadcast_to(made["body"].rest, made["replay"].position.shape)
+    still = dataclasses.replace(made["replay"], nodes=0 * made["replay"].nodes, position=stays)
     entries = simulation_by_phase(run_of(made, replay=still))
     for span in THREE:
         assert entries[f"tracked_held_out_{span}_moving_of_still_px"]["value"] == pytest.approx(100)
