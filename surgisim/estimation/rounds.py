@@ -154,9 +154,10 @@ def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np
 
     say(0.13, 1.0, f"trying {len(points)} starts")
     costs = costs_of(points)
-    more = [y for k in np.argsort(costs, kind="stable")[:OPENED] for y in wanted.openings(points[k])]
-    say(0.18, 1.0, f"trying {len(more)} moments of release")
-    points, costs = points + more, costs + costs_of(more)
+    for about, more_of in (("moments of release", wanted.openings), ("starts close to the best", wanted.closer)):
+        more = [y for k in np.argsort(costs, kind="stable")[:OPENED] for y in more_of(points[k])]
+        say(0.2, 1.0, f"trying {len(more)} {about}")
+        points, costs = points + more, costs + costs_of(more)
     for x, cost in zip(points, costs, strict=True):
         history.append({"round": "start", "cost": number(cost)} | plain(wanted, x))
     if not np.isfinite(costs).any():
