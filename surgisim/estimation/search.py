@@ -16,8 +16,8 @@ PRIOR_LOG = 1.5
 REACH = 2.0
 """How many prior deviations from its start a logarithm may go."""
 FIRST_STEPS, SECOND_STEPS = tuple(0.4 * k for k in range(-6, 3)), (0.0, 1.0, 2.0)
-"""Offsets of the first logarithm in the scan that precedes the descent, and of how the second then lies to it: two periods
-of a ring-down are told from those of one a fifth faster, so wider steps would pass between."""
+"""Offsets of the first logarithm in the scan that precedes the descent, and of how the second then lies to it: two
+periods of a ring-down are told from those of one a fifth faster, so wider steps would pass between."""
 CLOSER_STEPS = (-0.2, 0.2)
 """Offsets of both, about the best of those."""
 OPENING_STEPS = (-0.5, 0.5)
