@@ -74,6 +74,15 @@ def test_a_pale_patch_of_tissue_inside_the_picture_is_no_instrument():
     assert overlap(masked(rgb).tool, tool) > 0.88
 
 
+def test_tissue_that_the_lamp_burns_out_beside_the_instrument_is_no_instrument():
+    rgb, tool = operated(8, SIZE)
+    rows, columns = np.nonzero(tool[0])
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    glare = np.hypot(x - columns.mean(), y - rows.mean()) < 26
+    rgb[:, glare] = np.where(tool[:, glare][..., None], rgb[:, glare], np.array([250, 238, 216], np.uint8))
+    assert overlap(masked(rgb).tool, tool) > 0.9
+
+
 def test_a_still_clip_is_masked_too():
     rgb, tool = operated(1, SIZE)
     assert overlap(masked(rgb.repeat(5, 0)).tool, tool.repeat(5, 0)) > 0.9

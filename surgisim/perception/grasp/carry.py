@@ -7,24 +7,27 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.motion import Motion
 from surgisim.perception.grasp.contact import Contact
-from surgisim.perception.grasp.find import SHOWN, Grip
+from surgisim.perception.grasp.find import Grip
 from surgisim.perception.tracking import Paths
 from surgisim.perception.tracking.between import sample
 
+SHOWN = 3
+"""Held points that must be seen for their way to be known."""
+
 
 def carry(
-    grips: list[Grip], paths: Paths, contact: Contact | None, depth: Depth, camera: Camera, source: str
+    grips: list[Grip], paths: Paths, contacts: list[Contact | None], depth: Depth, camera: Camera, source: str
 ) -> Motion:
     """The grips as balls in the camera frame [m] and their ways.
 
-    paths: tissue points about each grip, hidden ones too. contact: the instrument as they meet it, none if there is
-    none. Behind the jaws the ball is carried by the ring of tissue around them that moves as one with it; where that is
-    hidden too, by the instrument.
+    paths: tissue points about each grip, hidden ones too. contacts: each grip's instrument as they meet it, none if
+    there is none. Behind the jaws the ball is carried by the ring of tissue around them that moves as one with it;
+    where that is hidden too, by the instrument.
     """
     frames = paths.xy.shape[1]
     z = _depth_at(depth, paths.xy)
     center, radius, position, active = [], [], [], []
-    for grip in grips:
+    for grip, contact in zip(grips, contacts, strict=True):
         rest_z = float(sample(depth.z[0].astype(np.float32), grip.center[None, None].astype(np.float32))[0, 0])
         held = np.linalg.norm(paths.xy[:, 0] - grip.center, axis=-1)
         ring = held <= max(grip.radius, np.sort(held)[min(8, len(held) - 1)])

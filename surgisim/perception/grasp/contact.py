@@ -1,6 +1,7 @@
-"""How near the instrument is to a point, and how it moves there."""
+"""How near an instrument is to the tissue, and how it moves there."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -11,14 +12,12 @@ from surgisim.perception.tracking.between import sample
 
 @dataclass(frozen=True)
 class Contact:
-    """The instrument as K tissue points meet it."""
+    """One instrument as K tissue points meet it."""
 
     away: np.ndarray
-    """Distance to the nearest instrument pixel [px], 0 behind it, (K, T)."""
-    body: np.ndarray
-    """Which connected piece of instrument that is, -1 when there is none, (K, T) int."""
+    """Distance to its nearest pixel [px], 0 behind it, (K, T)."""
     velocity: np.ndarray
-    """The instrument's motion there to the next frame [px], NaN where there is none, (K, T, 2)."""
+    """Its motion there to the next frame [px], NaN where there is none, (K, T, 2)."""
 
     def mean_velocity(self, held: np.ndarray) -> np.ndarray:
         """Its motion at points `held` (K,) to the next frame [px], NaN where it is not seen, (T, 2)."""
@@ -31,40 +30,43 @@ class Contact:
         return out
 
 
-def contact(rgb: np.ndarray, tool: np.ndarray, xy: np.ndarray) -> Contact:
-    """rgb: sRGB (T, H, W, 3) uint8. tool: (T, H, W) bool. xy: tissue points [px], (K, T, 2)."""
-    frames, (height, width) = len(rgb), rgb.shape[1:3]
+def frame_flow(rgb: np.ndarray) -> np.ndarray:
+    """Flow of each frame to the next [px], (T - 1, H, W, 2) float32."""
+    return np.stack([dense_flow(a, b) for a, b in pairwise(rgb)])
+
+
+def contact(flow: np.ndarray, tool: np.ndarray, xy: np.ndarray) -> Contact:
+    """How tissue points meet an instrument.
+
+    flow: of each frame to the next [px], (T - 1, H, W, 2). tool: (T, H, W) bool. xy: the points [px], (K, T, 2).
+    """
+    frames, height, width = tool.shape
     away = np.full(xy.shape[:2], np.hypot(height, width))
-    body = np.full(xy.shape[:2], -1)
     velocity = np.full(xy.shape, np.nan)
-    for t in range(frames):
-        if not tool[t].any():
-            continue
-        _, pieces = cv2.connectedComponents(tool[t].astype(np.uint8))
-        distance, label = cv2.distanceTransformWithLabels(
-            (~tool[t]).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-        )
-        owner = np.zeros(label.max() + 1, int)
-        owner[label[tool[t]]] = pieces[tool[t]]
+    for t in np.flatnonzero(tool.any((1, 2))):
+        distance = cv2.distanceTransform((~tool[t]).astype(np.uint8), cv2.DIST_L2, 5)
         inside = np.clip(xy[:, t], 0, [width - 1, height - 1])
         near = np.rint(inside).astype(int)
         # Tissue that left the image is as far from a seen instrument as it is from the edge, and more.
         away[:, t] = distance[near[:, 1], near[:, 0]] + np.linalg.norm(xy[:, t] - inside, axis=-1)
-        body[:, t] = owner[label[near[:, 1], near[:, 0]]]
         if t + 1 < frames and tool[t + 1].any():
-            flow = _near_tool(rgb[t], rgb[t + 1], tool[t], tool[t + 1])
-            velocity[:, t] = sample(flow, inside[:, None].astype(np.float32))[:, 0]
-    return Contact(away, body, velocity)
+            mean = _near_tool(flow[t], tool[t], tool[t + 1])
+            velocity[:, t] = sample(mean, inside[:, None].astype(np.float32))[:, 0]
+    return Contact(away, velocity)
 
 
-def _near_tool(first: np.ndarray, second: np.ndarray, tool: np.ndarray, tool_next: np.ndarray) -> np.ndarray:
-    """The instrument's flow, averaged over the instrument pixels around each pixel, (H, W, 2)."""
-    flow = dense_flow(first, second)
+def own_flow(flow: np.ndarray, tool: np.ndarray, tool_next: np.ndarray) -> np.ndarray:
+    """Pixels whose `flow` (H, W, 2) is the instrument's own: inside its outline here and where they go, (H, W) bool."""
     core = cv2.erode(tool.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     core = core if core.any() else tool
     end = np.rint(np.stack(np.meshgrid(np.arange(tool.shape[1]), np.arange(tool.shape[0])), -1) + flow).astype(int)
     end = np.clip(end, 0, np.array(tool.shape[::-1]) - 1)
-    weight = (core & tool_next[end[..., 1], end[..., 0]]).astype(np.float32)
+    return core & tool_next[end[..., 1], end[..., 0]]
+
+
+def _near_tool(flow: np.ndarray, tool: np.ndarray, tool_next: np.ndarray) -> np.ndarray:
+    """The instrument's flow, averaged over the instrument pixels around each pixel, (H, W, 2)."""
+    weight = own_flow(flow, tool, tool_next).astype(np.float32)
     radius = 0.05 * max(tool.shape)
     total = cv2.GaussianBlur(weight, (0, 0), radius)
     mean = cv2.GaussianBlur(flow * weight[..., None], (0, 0), radius)

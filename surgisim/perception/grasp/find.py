@@ -1,34 +1,32 @@
 """Find tissue that an instrument holds.
 
-Held tissue moves with the instrument that touches it, further than anything around it and all alike within the jaws;
-further off it moves less and less. It is let go when it no longer goes where the instrument goes: it springs back, or
-the instrument leaves it.
+Held tissue goes where the jaws go, further than the tissue around it. So each instrument is followed on its own, its
+jaws are looked for at its tip, and the tissue about them is asked, frame by frame, whether it goes along. A grip is
+a stretch of time in which it does; its place is the tissue that is at the jaws when the stretch begins.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from surgisim.perception.grasp.contact import Contact
+from surgisim.perception.grasp.contact import contact
+from surgisim.perception.grasp.following import AROUND, Following, following, jaw_motion
+from surgisim.perception.grasp.holding import began, held, let_go
+from surgisim.perception.grasp.instruments import Instrument
+from surgisim.perception.grasp.jaw_tissue import just_hidden, leading
 
-TOUCH = 0.04
-"""How near to the instrument held tissue is, as a share of the longer image side."""
-LEAST = 0.015
-"""Least displacement of tissue that is worth calling a grasp, as a share of the longer image side."""
 ALIKE = 0.15
 """Largest difference of displacement within the held ball, as a share of it."""
-REACH = 0.12
-"""Largest radius of what jaws can hold, as a share of the longer image side."""
-SOON = 8
-"""Frames within which tissue that is let go has visibly left."""
-ATTEMPTS, FEW = 12, 5
-"""Displacements looked into, the largest first; points that are too few to tell a grasp."""
-
-
-SHOWN = 3
-"""Held points that must be seen for their way to be known."""
-LIKELY, SURE = 0.4, 0.55
-"""Least confidence of the first and of any further grip that is reported."""
+REACH, SMALL = 0.06, 0.015
+"""Largest and least radius of what jaws hold, as a share of the longer image side."""
+BEHIND = 0.02
+"""How far behind the tip tissue is held, as a share of the longer image side."""
+WORTH = 0.008
+"""A way of held tissue that is surely more than an error of tracking, as a share of the longer image side."""
+NEARBY = (0.25, 0.5)
+"""Where tissue is not carried by the jaws themselves: distances from them, as a share of the longer image side."""
+LIKELY = 0.5
+"""Least confidence of a grip that is reported."""
 
 
 @dataclass(frozen=True)
@@ -45,143 +43,117 @@ class Grip:
     """Last frame in which it is held."""
     confidence: float
     """0-1."""
+    way: float = 0.0
+    """How far the tissue at the jaws is carried at most [px]."""
+    instrument: int = -1
+    """Whose grip it is; -1 if that is not known."""
 
 
 def find(
-    start: np.ndarray, moved: np.ndarray, seen: np.ndarray, contact: Contact, side: int, cell: float
+    xy: np.ndarray, seen: np.ndarray, tools: list[Instrument], flow: np.ndarray, side: int, cell: float
 ) -> list[Grip]:
-    """The grips of a recording, in the order of time.
+    """Every grip that may be one, the likeliest first; those above `LIKELY` are to be believed.
 
-    start: tissue points on an even grid of frame 0 [px], (K, 2), each standing for `cell` px^2. moved: how far each is
-    from there [px], (K, T, 2). seen: where that is no guess, (K, T) bool. contact: the instrument as they meet it.
-    side: longer image side [px].
+    xy: tissue points of an even grid of frame 0 [px], (K, T, 2), each standing for `cell` px^2. seen: where that is no
+    guess, (K, T) bool. flow: of each frame to the next [px], (T - 1, H, W, 2). side: longer image side [px].
     """
-    free = seen.copy()
-    found: list[tuple[Grip, np.ndarray]] = []
-    for _ in range(ATTEMPTS):
-        reach = np.where((contact.away < TOUCH * side) & free, np.linalg.norm(moved, axis=-1), 0.0)
-        # The fifth furthest point: one stray point is no grasp.
-        peak = np.sort(reach, axis=0)[-min(FEW, len(reach))]
-        if not len(peak) or peak.max() < LEAST * side:
-            break
-        top = int(np.argmax(peak > 0.95 * peak.max()))
-        held = _ball(start, moved[:, top], reach[:, top], contact.away[:, top] < 1.0, peak[top], side, cell)
-        course = np.median(moved[held], axis=0)
-        begin = _begin(course, contact, held, top, side)
-        end = _end(course, contact, held, seen[held].sum(0) >= SHOWN, top, side)
-        grip = _grip(start[held], course, contact, held, seen, (begin, top, end), side, cell)
-        if end - begin >= 3 and held.sum() > FEW and grip.confidence > LIKELY:
-            found.append((grip, course))
-        near = np.linalg.norm(start - grip.center, axis=-1) < REACH * side
-        free[near, max(begin - 2, 0) : _settled(course, end, len(peak))] = False
-        free[held] = False
+    if not tools or xy.shape[1] < 4:
+        return []
+    touched = contact(flow, np.any([i.mask for i in tools], 0), xy).away
+    candidates: list[tuple[Grip, np.ndarray]] = []
+    for index, tool in enumerate(tools):
+        at_jaws = contact(flow, tool.jaws, xy).away
+        follows = following(xy, seen, at_jaws, touched, jaw_motion(flow, tool, side), tool.tip - tool.entry, side)
+        for first, last in held(follows, side):
+            found = _grip(xy, seen, touched, at_jaws, tool, follows, (first, last), side, cell)
+            if found is not None:
+                grip, course = found
+                candidates.append((replace(grip, instrument=index), course))
     grips: list[tuple[Grip, np.ndarray]] = []
-    for grip, course in sorted(found, key=lambda f: -f[0].confidence):
-        if (not grips or grip.confidence > SURE) and all(
-            _apart(course, grip, other, known, side) for known, other in grips
-        ):
+    for grip, course in sorted(candidates, key=lambda c: -c[0].confidence):
+        if all(_apart(course, grip, other, known) for known, other in grips):
             grips.append((grip, course))
-    return sorted((g for g, _ in grips), key=lambda g: g.begin)
+    return [g for g, _ in grips]
 
 
-def _ball(start, moved: np.ndarray, reach: np.ndarray, hidden: np.ndarray, peak: float, side: int, cell: float):
-    """Points that move as the furthest touched ones do, and those that the jaws hide among them, (K,) bool."""
-    lead = reach >= 0.85 * peak
-    # Where most of them are together: what else happens to move as far elsewhere is not of the same grasp.
-    close = np.linalg.norm(start[lead][:, None] - start[lead], axis=-1) < REACH * side
-    about = start[lead][close.sum(1).argmax()]
-    lead &= np.linalg.norm(start - about, axis=-1) < REACH * side
-    carried = np.median(moved[lead], axis=0)
-    alike = lead | (np.linalg.norm(moved - carried, axis=-1) < ALIKE * np.linalg.norm(carried))
-    near = alike & (np.linalg.norm(start - about, axis=-1) < REACH * side)
-    for _ in range(5):
-        about = start[near].mean(0)
-        radius = min(1.2 * np.sqrt(near.sum() * cell / np.pi), REACH * side)
-        closer = (alike | hidden) & (np.linalg.norm(start - about, axis=-1) < radius)
-        if closer.sum() < 3:
-            break
-        near = closer
-    return near
+def _grip(
+    xy, seen, touched, at_jaws, tool: Instrument, follows: Following, stretch: tuple[int, int], side: int, cell: float
+):
+    """The grip of one stretch and the course of what it holds [px], (T, 2); none if no tissue is there."""
+    frames, (first, last) = xy.shape[1], stretch
+    start = xy[:, 0]
+    center = _place(xy, seen, touched, at_jaws, tool, follows, (first, last), side)
+    if center is None:
+        return None
+    near = np.argsort(np.linalg.norm(start - center, axis=-1))[:9]
+    course = np.median(xy[near] - start[near][:, None], axis=0)
+    begin = began(follows, first, side)
+    end = let_go(follows, last, frames)
+    if end - begin < 3:
+        return None
+    far = np.linalg.norm(course - course[begin], axis=-1)[begin : end + 1]
+    top = begin + int(far.argmax())
+    radius = _radius(start, xy[:, top] - xy[:, begin], center, side, cell)
+    confidence = _confidence(xy, seen, at_jaws, follows, (begin, top, end), side)
+    return Grip(center, radius, begin, end, confidence, float(far.max())), course
 
 
-def _begin(course: np.ndarray, contact: Contact, held: np.ndarray, top: int, side: int) -> int:
-    """When the instrument came to stand at the tissue before it took it along."""
-    far = np.linalg.norm(course, axis=-1)
-    at_home = np.flatnonzero(far[: top + 1] < max(0.3, 0.04 * far[top]))
-    begin = int(at_home[-1]) if len(at_home) else 0
-    still = np.linalg.norm(contact.mean_velocity(held), axis=-1) < 0.002 * side
-    touching = np.median(contact.away[held], axis=0) < TOUCH * side
-    first = max(begin - SOON, 0)
-    while begin > first and still[begin - 1] and touching[begin - 1]:
-        begin -= 1
-    return begin
+def _place(xy, seen, touched, at_jaws, tool: Instrument, follows: Following, stretch: tuple[int, int], side: int):
+    """Where in frame 0 the tissue lies that is at the jaws as they close [px], (2,); none where they are not seen.
+
+    Of three: a little behind the tip; halfway from the tip to tissue that has just got hidden ahead of it, by jaws that
+    the mask lacks; halfway to the tissue about it that goes along as one, as far as any does.
+    """
+    first, last = stretch
+    frames = np.arange(max(first - 3, 0), min(first + 1, last) + 1)
+    frames = frames[np.isfinite(tool.tip[frames, 0])]
+    if not len(frames):
+        return None
+    start, ends, inward = xy[:, 0], [], np.nanmedian(tool.entry[frames] - tool.tip[frames], axis=0)
+    for t in frames:
+        near = np.argsort(np.linalg.norm(xy[:, t] - tool.tip[t], axis=-1))[:6]
+        ends.append(tool.tip[t] - np.median(xy[near, t] - start[near], axis=0))
+    tip, inward = np.median(ends, axis=0), inward / max(np.linalg.norm(inward), 1e-9)
+    hidden = just_hidden(xy, seen, touched, tool, first, last, side)
+    if len(hidden):
+        return 0.5 * (tip + np.median(hidden, axis=0))
+    lead, share = leading(xy, seen, at_jaws, tool, follows, stretch, side)
+    return tip + (1 - share) * BEHIND * side * inward + 0.5 * share * (lead - tip)
 
 
-def _end(course: np.ndarray, contact: Contact, held: np.ndarray, shown: np.ndarray, top: int, side: int) -> int:
-    """The last frame in which the tissue goes where the instrument goes, as far as it is `shown`, (T,) bool."""
-    frames = len(course)
-    step = np.diff(course, axis=0)
-    tool = contact.mean_velocity(held)[:-1]
-    apart = np.where(np.isfinite(tool), step - tool, 0.0)
-    away = np.median(contact.away[held], axis=0)
-    for t in range(top, frames - 1):
-        soon = min(t + SOON, frames - 1)
-        far = np.linalg.norm(course[t])
-        seen = np.isfinite(tool[t:soon]).all(-1).any()
-        parted = np.linalg.norm(np.cumsum(apart[t:soon], axis=0), axis=-1) > 0.25 * far
-        back = np.linalg.norm(course[t + 1 : soon + 1], axis=-1) / far
-        left = away[t + 1 : soon + 1] - away[t] > 0.15 * far + 0.01 * side
-        sudden = (back < 0.5) & (np.arange(len(back)) < SOON / 2)
-        gone = parted & (((back < 0.75) & (left | sudden)) | (away[t + 1 : soon + 1] > 2 * TOUCH * side))
-        if not seen:
-            gone = (back < 0.4) & sudden
-        gone &= shown[t + 1 : soon + 1]
-        if gone.any():
-            until = t + int(np.argmax(gone)) + 1
-            jump = np.linalg.norm(apart[t:until] if seen else step[t:until], axis=-1)
-            return t + int(np.argmax(jump > 0.3 * jump.max()))
-    return frames - 1
+def _radius(start, moved: np.ndarray, center: np.ndarray, side: int, cell: float) -> float:
+    """Of the tissue about `center` that goes as one with it [px]."""
+    away = np.linalg.norm(start - center, axis=-1)
+    lead = np.median(moved[np.argsort(away)[:6]], axis=0)
+    alike = np.linalg.norm(moved - lead, axis=-1) < ALIKE * np.linalg.norm(lead)
+    area = (alike & (away < REACH * side)).sum() * cell
+    return float(np.clip(np.sqrt(area / np.pi), SMALL * side, REACH * side))
 
 
-def _apart(course: np.ndarray, grip: Grip, other: np.ndarray, known: Grip, side: int) -> bool:
+def _confidence(xy, seen, at_jaws, follows: Following, times: tuple[int, int, int], side: int) -> float:
+    """How sure it is that this is a grip, 0-1: far enough, together, and with the tissue straining about it."""
+    begin, top, end = times
+    told = np.isfinite(follows.agreement[begin:end])
+    weight = np.where(told, follows.way[begin:end], 0.0)
+    together = float((weight * np.nan_to_num(follows.agreement[begin:end])).sum() / max(weight.sum(), 1e-9))
+    moved = np.linalg.norm(xy[:, top] - xy[:, begin], axis=-1)
+    both = seen[:, begin] & seen[:, top]
+    distance = np.minimum(at_jaws[:, begin], at_jaws[:, top])
+    near = distance < AROUND * side
+    near = near & both if (near & both).sum() >= 4 else near
+    rest = both & (distance > NEARBY[0] * side) & (distance < NEARBY[1] * side)
+    here = float(np.quantile(moved[near], 0.75)) if near.any() else 0.0
+    there = float(np.median(moved[rest])) if rest.sum() > 10 else 0.0
+    size = 1 - np.exp(-here / (WORTH * side))
+    strain = np.clip(1.5 * (1 - there / max(here, 1e-9)), 0.0, 1.0)
+    return float(np.clip(size * np.clip(1.5 * together, 0, 1) * strain * (0.5 + 0.5 * min(1.0, 4 * told.mean())), 0, 1))
+
+
+def _apart(course: np.ndarray, grip: Grip, other: np.ndarray, known: Grip) -> bool:
     """Whether this is not the tissue about a grip already known, dragged along by it."""
     first, last = max(grip.begin, known.begin), min(grip.end, known.end)
     if last - first < 3:
-        return last < first
+        return True
     a, b = np.diff(course[first : last + 1], axis=0).ravel(), np.diff(other[first : last + 1], axis=0).ravel()
     alike = (a @ b) / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-9)
-    return bool(alike < 0.5 and np.linalg.norm(grip.center - known.center) > 2 * TOUCH * side)
-
-
-def _settled(course: np.ndarray, end: int, frames: int) -> int:
-    """The first frame after `end` in which the tissue is still again, or three quarters back."""
-    far = np.linalg.norm(course, axis=-1)
-    for t in range(end + 1, frames):
-        if far[t : t + 4].max() < 0.25 * far[end]:
-            return t
-    return frames
-
-
-def _grip(start, course, contact: Contact, held, seen, times: tuple[int, int, int], side: int, cell: float) -> Grip:
-    begin, top, end = times
-    along = _along(course, contact.mean_velocity(held), seen[held].sum(0) >= SHOWN, begin, end)
-    touching = (np.median(contact.away[held, begin : end + 1], axis=0) < 2 * TOUCH * side).mean()
-    size = 1 - np.exp(-np.linalg.norm(course[top]) / (2 * LEAST * side))
-    shown = min(1.0, 2.5 * seen[held, begin : end + 1].mean())
-    radius = float(np.clip(np.sqrt(len(start) * cell / np.pi), 0.015 * side, 0.1 * side))
-    confidence = float(size * (0.3 + 0.7 * along) * (0.3 + 0.7 * touching) * (0.3 + 0.7 * shown))
-    return Grip(start.mean(0), radius, begin, end, confidence)
-
-
-def _along(course: np.ndarray, tool: np.ndarray, shown: np.ndarray, begin: int, end: int) -> float:
-    """How far the instrument goes where the tissue goes, 0-1, a few frames at a time; 0.5 if neither can be seen."""
-    agreed, total = 0.0, 0.0
-    for t in range(begin, end):
-        until = min(t + SOON, end)
-        if not (shown[t] and shown[until] and np.isfinite(tool[t:until]).all()):
-            continue
-        tissue, jaws = course[until] - course[t], tool[t:until].sum(0)
-        way = max(np.linalg.norm(tissue), np.linalg.norm(jaws))
-        agreed += max(way - np.linalg.norm(tissue - jaws), 0.0)
-        total += way
-    return float(agreed / total) if total > 1.0 else 0.5
+    return bool(alike < 0.5)

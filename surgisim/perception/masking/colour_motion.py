@@ -24,6 +24,10 @@ LOW, HIGH = np.array([-0.7, -1.0, 2.0]), np.array([1.2, 1.0, 5.6])
 ROUNDS = 4
 FULL = 3.9
 """Evidence of a colour that could not be clearer: the logarithm of the odds."""
+BRIGHT, BURNT = 215, 240
+"""Brightest channel from which a camera compresses it; from which it is lost [0-255]."""
+REDDISH = 0.03
+"""Logarithm of red over green above which a bright surface is not white."""
 
 
 def tool(frames: Frames, given: Given, settings: Masking, progress) -> tuple[np.ndarray, np.ndarray]:
@@ -70,9 +74,12 @@ def _by_redness(seen: np.ndarray) -> np.ndarray:
         # So much cannot be instrument: the tissue is pale here (fat, fascia), and pale tissue is bright.
         dark = float(threshold_otsu(brightness[some][bloodless]))
         evidence = np.minimum(evidence, FULL * np.clip((dark - brightness) / 0.2, -1, 1))
-    # Burnt-out white has lost its colour, and black never had any.
+    # Burnt-out white has lost its colour, and black never had any. Where red is burnt out and exceeds green still, the
+    # surface is redder than it looks.
     shown = np.exp(brightness) - OFFSET
-    return evidence * np.clip((shown - 4) / 16, 0.1, 1) * np.where(shown > 240, 0.2, 1)
+    burnt = np.clip((shown - BRIGHT) / (BURNT - BRIGHT), 0, 1) * (red > REDDISH)
+    evidence = np.where(evidence > 0, evidence * (1 - burnt) - 0.5 * FULL * burnt, evidence)
+    return evidence * np.clip((shown - 4) / 16, 0.1, 1) * np.where(shown > BURNT, 0.2, 1)
 
 
 def _bins(seen: np.ndarray) -> np.ndarray:

@@ -15,9 +15,12 @@ from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.tracking import Tracking
 from surgisim.perception.grasp.carry import carry
-from surgisim.perception.grasp.contact import contact
-from surgisim.perception.grasp.find import Grip, find
+from surgisim.perception.grasp.contact import contact, frame_flow
+from surgisim.perception.grasp.find import LIKELY, Grip, find
 from surgisim.perception.grasp.given import given
+from surgisim.perception.grasp.instruments import instruments, nearest
+from surgisim.perception.grasp.say import advice, whose
+from surgisim.perception.masking.appearance import lit
 from surgisim.perception.tracking import Paths
 from surgisim.perception.tracking.lift import lift
 from surgisim.perception.tracking.points import at, shrink, spread_points
@@ -25,6 +28,8 @@ from surgisim.problem import Problem
 
 DENSE = 2000
 """Points followed to find a grasp and to choose from."""
+SURE = 0.7
+"""Confidence of a grasp below which the run says how to mark it."""
 
 
 def follow(
@@ -50,13 +55,17 @@ def follow(
     queries = spread_points(everywhere, min(spread_count, everywhere.size // 4))
     cell = everywhere.size / len(queries)
     paths = _backend(settings.backend)(rgb, masks.tool, masks.specular, queries, settings=settings, progress=progress)
-    source = "given" if grips else "found"
-    tool = contact(rgb, masks.tool, paths.xy) if masks.tool.any() else None
-    if not grips and settings.find_grasp and tool is not None:
-        moved = median_filter((paths.xy - paths.xy[:, :1]).astype(float), size=(1, 3, 1), mode="nearest")
-        grips = find(paths.xy[:, 0].astype(float), moved, paths.visible, tool, max(rgb.shape[1:3]), cell)
-    motion = carry(grips, paths, tool, depth, camera, source)
-    _say(motion, camera, settings)
+    source, side, seen = "given" if grips else "found", max(rgb.shape[1:3]), []
+    flow = frame_flow(rgb) if masks.tool.any() and len(rgb) > 1 else None
+    tools = instruments(masks.tool, lit(rgb)[0], flow) if flow is not None else []
+    if not grips and settings.find_grasp and tools:
+        xy = median_filter(paths.xy.astype(float), size=(1, 3, 1), mode="nearest")
+        seen = find(xy, paths.visible, tools, flow, side, cell)
+        grips = sorted((g for g in seen if g.confidence >= LIKELY), key=lambda g: g.begin)
+    holders = [g.instrument if g.instrument >= 0 else nearest(tools, g.center, g.begin) for g in grips]
+    contacts = [contact(flow, tools[h].mask, paths.xy) if h is not None else None for h in holders]
+    motion = carry(grips, paths, contacts, depth, camera, source)
+    _say(motion, camera, settings, [whose(tools, grip) for grip in grips], advice(seen, tools, camera))
     keep = _choose(queries, usable, grips, settings)
     if not keep.any():
         raise Problem("tracking: the tissue of frame 0 is too small to follow a point on. Check masks.npz.")
@@ -82,14 +91,19 @@ def _choose(queries: np.ndarray, usable: np.ndarray, grips: list[Grip], settings
     return keep
 
 
-def _say(motion: Motion, camera: Camera, settings: Tracking) -> None:
+def _say(motion: Motion, camera: Camera, settings: Tracking, holders: list[str], hint: str) -> None:
+    """What was found, at once; and how to mark what was not, or is not sure."""
     if motion.source == "none":
         why = "no instrument was seen to hold tissue" if settings.find_grasp else "none was given and none looked for"
         print(f"tracking: no grasp: {why}; nothing will be driven.", file=sys.stderr)
-    for active, confidence, radius in zip(motion.active, motion.confidence, motion.radius, strict=True):
+    for active, confidence, radius, holder in zip(
+        motion.active, motion.confidence, motion.radius, holders, strict=True
+    ):
         first, last = np.flatnonzero(active)[[0, -1]]
         print(
-            f"tracking: grasp {motion.source}: {first / camera.fps:.2f} to {last / camera.fps:.2f} s, "
+            f"tracking: grasp {motion.source}{holder}: {first / camera.fps:.2f} to {last / camera.fps:.2f} s, "
             f"radius {1e3 * radius:.1f} mm, confidence {confidence:.2f}.",
             file=sys.stderr,
         )
+    if settings.find_grasp and motion.source != "given" and (motion.source == "none" or min(motion.confidence) < SURE):
+        print(f"tracking: {hint}", file=sys.stderr)
