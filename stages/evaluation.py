@@ -1,6 +1,7 @@
 """Measure what a run achieved: every number with its unit and protocol.
 
-reads   every artifact of the run, the truth where the clip was invented, benchmark files
+reads   every artifact of the run, the truth where the clip was invented, the grip as tracking
+        found it (found) beside that of the fit (motion), benchmark files
 writes  metrics.json    Metrics
 """
 
@@ -40,6 +41,7 @@ from surgisim.stage import Maybe, Source, stage
         "fit": Fit,
         "replay": Replay,
         "truth": Maybe(Truth),
+        "found": Maybe(Motion),
         "benchmarks": Source("folder of Snakemake's STAGE.tsv, or such files joined by ':'", required=False),
     },
     writes={"metrics": Metrics},

@@ -35,6 +35,8 @@ class Estimation(Settings):
     """Whether to choose how deep and where the body is held by what fits the pull best [-]."""
     carrying: bool = True
     """Whether what is open of the grips (how far they come nearer, size, release) is fitted with the laws [-]."""
+    brightness: bool = True
+    """Whether the light of moving tissue counts: under a lamp at the camera it tells how the surface turns [-]."""
     density: float = Field(1050.0, gt=0)
     """Mass density of the tissue [kg/m^3]."""
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)

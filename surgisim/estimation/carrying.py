@@ -18,9 +18,9 @@ from surgisim.estimation.unknown import Unknown
 TOWARD, TOWARD_MEASURED = 0.08, 0.01
 """Spread of how far a grip comes nearer, as a share of its distance: a pull of some 5 to 10 mm at 50 to 100 mm, and
 what is left open of it where depth is measured in every frame."""
-BESIDE = 0.02
-"""Spread of where the held ball's middle is across the view, each way, as a share of its distance."""
-ACROSS, RADIUS = 0.05, 0.15
+BESIDE = 0.4
+"""Spread of where the held ball's middle is across the view, each way, as a share of its radius: jaws hide it."""
+ACROSS, RADIUS = 0.08, 0.3
 """Spread of the logarithms of a path's length across the view, and of a held ball's radius."""
 RELEASE, RELEASE_SPREAD, RELEASE_ENDS = 0.5, 0.6, (-2.0, 3.0)
 """Frames after its last active one at which a grip opens: between that frame and the next, if it was found rightly."""
@@ -76,12 +76,13 @@ def carrying(motion: Motion, tracks: Tracks, camera: Camera, measured: bool) -> 
     unknowns: list[Unknown] = []
     toward = TOWARD_MEASURED if measured else TOWARD
     for j, center in enumerate(motion.center_rest):
+        beside = BESIDE * float(motion.radius[j] / center[2])
         unknowns += [
             Unknown(named(j, "toward"), 0.0, toward, -4 * toward, 4 * toward, "m", size=float(center[2])),
-            Unknown(named(j, "right"), 0.0, BESIDE, -3 * BESIDE, 3 * BESIDE, "m", size=float(center[2])),
-            Unknown(named(j, "down"), 0.0, BESIDE, -3 * BESIDE, 3 * BESIDE, "m", size=float(center[2])),
+            Unknown(named(j, "right"), 0.0, beside, -3 * beside, 3 * beside, "m", size=float(center[2])),
+            Unknown(named(j, "down"), 0.0, beside, -3 * beside, 3 * beside, "m", size=float(center[2])),
             Unknown(named(j, "across"), 0.0, ACROSS, -4 * ACROSS, 4 * ACROSS, "1", True),
-            Unknown(named(j, "radius"), 0.0, RADIUS, -4 * RADIUS, 4 * RADIUS, "m", True, float(motion.radius[j])),
+            Unknown(named(j, "radius"), 0.0, RADIUS, -3 * RADIUS, 2 * RADIUS, "m", True, float(motion.radius[j])),
         ]
         if not motion.active[j, -1]:
             unknowns.append(Unknown(named(j, "release"), RELEASE, RELEASE_SPREAD, *RELEASE_ENDS, "frames"))

@@ -18,6 +18,7 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
+from surgisim.estimation.brightness import brightness, spoilt
 from surgisim.estimation.carrying import carrying, course
 from surgisim.estimation.damping import numerical_damping
 from surgisim.estimation.gauss_newton import Solution
@@ -35,9 +36,11 @@ from surgisim.estimation.rounds import (
     descend,
     number,
     settle_grip,
+    settle_pull,
     windows,
 )  # fmt: skip
 from surgisim.estimation.search import Search, search
+from surgisim.estimation.stated import by_phase
 from surgisim.estimation.support import EDGES, Support, open_depth
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
@@ -47,6 +50,8 @@ from surgisim.problem import Problem
 
 Say = Callable[[float, float, str], None]
 
+FLOOR = 0.01
+"""Least standard deviation of a tracked displacement, as a share of the grid's spacing."""
 STILL = 0.5
 """Motion below which a track is taken to stand still [px]."""
 
@@ -107,7 +112,7 @@ def estimate(
     if reason:
         return Estimate(*_unfitted(make(body, motion), wanted, settings, camera, reason), motion, body)
     bodies = [make(body, motion) for _ in range(WORKERS)]
-    observation = observe(tracks, motion, camera, bodies[0].simulator, floor=0.02 * body.spacing)
+    observation = observe(tracks, motion, camera, bodies[0].simulator, floor=FLOOR * body.spacing)
     total = len(frames.rgb)
     fitted = fitted_frames(frames.split)
     held_out = np.setdiff1d(np.arange(1, total), fitted)
@@ -115,6 +120,7 @@ def estimate(
     trial = Trial(bodies, wanted, motion, observation, body.held, camera.fps, total, fitted, firm=False)
     if settings.enabled:
         trial = _opened(trial, body, tracks, camera, settings, make)
+        trial = _lit(trial, body, tracks, frames, masks, settings)
     parts = {
         "held_out": held_out,
         "after_release": np.intersect1d(held_out, np.flatnonzero(phase == PHASES.index("release"))),
@@ -124,10 +130,12 @@ def estimate(
     progress = _onward(progress)
     trial, run = settle_grip(trial, x, history)
     before = {name: trial.stand(x)[0].observation.error(run.u, at) for name, at in parts.items()}
+    before_each = trial.stand(x)[0].observation.each(run.u, held_out)
     if trial.laying:
         trial, x = choose_support(trial, phase, history, progress)
         trial, _ = settle_grip(trial, x, history)
     if settings.enabled and wanted.free:
+        x = settle_pull(trial, x, phase, settings, history, progress)
         x = choose_start(trial, x, history, progress)
         ends = windows(fitted, phase, settings.first_window)
         trial, solution = descend(trial, x, ends, settings, history, progress)
@@ -136,10 +144,9 @@ def estimate(
             ask = partial(otherwise, camera=camera, points=carried, make=make)
             trial, solution, model = _weighed(trial, solution, ask, ends[-1:], settings, history, progress)
         x = solution.x
-        phase_of = np.broadcast_to(phase[fitted][None, :, None], (len(observation.rest), len(fitted), 3)).ravel()
         table = identifiability(
-            solution, trial.wanted, phase_of=phase_of, phase_names=PHASES, density=settings.density,
-            length=trial.depth(x), independent=INDEPENDENT, model=model,
+            solution, trial.wanted, phase_of=trial.of_frames(phase), phase_names=PHASES, density=settings.density,
+            length=trial.depth(x), independent=INDEPENDENT, region=trial.regions, model=model,
         )  # fmt: skip
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
     support = Support(trial.depth(x), *edge)
@@ -151,6 +158,7 @@ def estimate(
     prepared, laid = trial.bodies[0], trial.bodies[0].body
     path = trial.drive(values, stiffest=prepared.stiffest(theta))
     after = {name: trial.observation.error(run.u, at) for name, at in parts.items()}
+    after_each = trial.observation.each(run.u, held_out)
     apart = f"held-out track error {after['held_out'] * 1e3:.3f} mm"
     progress(1.0, 1.0, f"{apart} ({before['held_out'] * 1e3:.3f} mm with default parameters)")
     if refined:
@@ -169,6 +177,7 @@ def estimate(
             "after_release_fitted": number(after["after_release"]),
             "used_default": number(before["fitted_frames"]),
             "used_fitted": number(after["fitted_frames"]),
+            "by_phase": by_phase(before_each, after_each, phase[held_out]),
             "frames": held_out.tolist(),
             "points": int(observation.moving.sum()),
             "field_kept": bool(refined.kept) if refined else False,
@@ -202,6 +211,24 @@ def _opened(
     depth = open_depth(laid)
     laying = Laying(laid, EDGES[0].beyond * depth.size, EDGES[0].rim, trial.observation, make)
     return replace(trial, wanted=replace(wanted, depth=depth), laying=laying)
+
+
+def _lit(trial: Trial, body: Body, tracks: Tracks, frames: Frames, masks: Masks, settings: Estimation) -> Trial:
+    """The trial with the light of its points, where enough of them can be seen to stand still and to move."""
+    if not settings.brightness:
+        return trial
+    rest, motion = tracks.xyz[:, 0].astype(float), trial.motion
+    free = np.isfinite(rest).all(1) & tracks.visible[:, 0]
+    for center, radius in zip(motion.center_rest, motion.radius, strict=True):
+        free &= np.linalg.norm(rest - center, axis=1) > radius
+    used = np.isin(np.arange(trial.frames), [0, *trial.fitted])
+    light = brightness(
+        frames.rgb, spoilt(masks), rest[free], tracks.xy[free].astype(float), tracks.visible[free] & used,
+        course(tracks, motion), trial.bodies[0].simulator, step=0.5 * body.spacing, independent=INDEPENDENT,
+    )  # fmt: skip
+    observation = replace(trial.observation, light=light)
+    laying = replace(trial.laying, observation=observation) if trial.laying else None
+    return replace(trial, observation=observation, laying=laying)
 
 
 def _weighed(

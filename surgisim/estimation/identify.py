@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from surgisim.estimation.gauss_newton import Solution
+from surgisim.estimation.gauss_newton import WIDTH, Solution
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import Support
 
@@ -12,6 +12,9 @@ OPEN_TOLD = 0.5
 """The same of what is open beside the laws, whose priors are narrow."""
 RESTS = 0.2
 """Share of a quantity's variance from which on what was taken for granted is named."""
+FREE, FREELY = "release", 0.5
+"""The phase in which no grip drives the tissue, and the least share of the information on E or eta that must
+come from there: while tissue is driven, an error of the grip's path in time looks like either."""
 TOLD = 0.1
 """A number counts as told by the clip when its posterior spread is at most this share of the prior's: a modulus to
 about 25 % either way (90 %), Poisson's ratio to about .02."""
@@ -26,19 +29,21 @@ def identifiability(
     density: float,
     length: float,
     independent: float,
+    region: np.ndarray,
     model: Mapping[str, np.ndarray] | None = None,
 ) -> dict:
     """Parameters and groups with 90 % intervals, the share of information from each phase, and whether told.
 
     phase_of: phase of every residual, (R,). length: thickness of the body [m].
     independent: share of the residuals that count as independent, because tracking noise is
-    correlated along a track and between neighbours; the misfit's own size scales the noise.
+    correlated along a track and between neighbours; the misfit's own size scales the noise, and where regions of the
+    tissue pull the numbers apart by more than that, intervals are as wide as they do (`regional`). region: where every
+    residual was seen, (R,) int.
     model: for what was taken for granted, by its name, what it adds to the parameters' covariance in search space,
     (M, M). Whatever has a fifth of a quantity's variance is named in its `rests_on`, with its share.
     """
     J, r, spread, model = solution.jacobian, solution.residual, search.spread, model or {}
-    information = independent / spread_of(r) * (J.T @ J)
-    covariance = np.linalg.inv(information + np.diag(1 / spread**2)) + sum(model.values())
+    covariance = regional(J, r, independent / spread_of(r), spread, region) + sum(model.values())
     result = {}
     for name, direction, value, unit, logarithmic, size in _quantities(search, solution.x, density, length):
         sd = float(np.sqrt(direction @ covariance @ direction))
@@ -54,7 +59,10 @@ def identifiability(
             )
         )
         edge = _at_edge(search, solution.x, direction)
+        owed = {n: float(direction @ c @ direction) / sd**2 for n, c in model.items()}
         told = sd <= (OPEN_TOLD if name in {u.name for u in search.open} else TOLD) * prior and not edge
+        if ".E" in name or ".eta" in name:
+            told = told and total > 0 and by_phase.get(FREE, 0.0) > FREELY * total
         result[name] = {
             "value": float(value),
             "low": float(low),
@@ -62,14 +70,31 @@ def identifiability(
             "unit": unit,
             "told": bool(told),
             "at_edge": edge,
-            "rests_on": {
-                n: round(float(share), 3)
-                for n, c in model.items()
-                if (share := direction @ c @ direction / sd**2) > RESTS
-            },
+            "rests_on": {n: round(share, 3) for n, share in owed.items() if share > RESTS},
             "phases": {n: round(v / total, 3) if total > 0 else 0.0 for n, v in by_phase.items()},
         }
     return result
+
+
+def regional(J: np.ndarray, r: np.ndarray, share: float, spread: np.ndarray, region: np.ndarray) -> np.ndarray:
+    """Covariance in search space, (M, M), that holds where parts of the tissue ask for different numbers, too.
+
+    J: derivative, (R, M); r: weighted residuals, (R,); share: how much of a residual's square counts; spread: of the
+    prior, (M,); region: which errors may go together, (R,) int. Where the model is right and its noise as stated,
+    regions pull at the numbers as much as the information says, and this is its inverse; no direction is taken to be
+    surer than that.
+    White, Maximum likelihood estimation of misspecified models, Econometrica 50, 1982; clusters as in Liang and Zeger,
+    Longitudinal data analysis using generalized linear models, Biometrika 73, 1986.
+    """
+    weight = np.minimum(1.0, WIDTH / np.maximum(np.abs(r), 1e-12))
+    pulls = np.zeros((int(region.max()) + 1, J.shape[1]))
+    np.add.at(pulls, region, share * (weight * r)[:, None] * J)
+    count = len(np.unique(region))
+    value, vector = np.linalg.eigh(share * (J.T @ J) + np.diag(1 / spread**2))
+    root = vector / np.sqrt(value)
+    among, turn = np.linalg.eigh(count / max(count - 1, 1) * (pulls @ root).T @ (pulls @ root))
+    wide = root @ turn
+    return (wide * np.maximum(among, 1.0)) @ wide.T
 
 
 def spread_of(r: np.ndarray) -> float:

@@ -10,6 +10,7 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.frames import USED
 from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
+from surgisim.estimation.brightness import Brightness
 from surgisim.mpm.simulator import Simulator
 from surgisim.problem import Problem
 
@@ -67,13 +68,19 @@ class Observation:
 
     def error(self, u: np.ndarray, frames: np.ndarray) -> float:
         """Mean distance between simulated and seen points that move, at `frames` [m]; NaN if none is seen."""
-        if not len(frames):
-            return float("nan")
-        used = self.weight[:, frames] > 0
-        seen = used.any(-1) & self.moving[:, None]
-        apart = self.apart(self._simulated(u, frames), frames)
-        distance = np.linalg.norm(np.where(used, apart, 0.0), axis=-1)[seen]
+        distance = self.each(u, frames)[self._counted(frames)]
         return float(np.mean(distance)) if len(distance) else float("nan")
+
+    def each(self, u: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """Distance of every point that moves, at `frames` [m], (K, len(frames)); NaN where it does not count."""
+        if not len(frames):
+            return np.full((len(self.rest), 0), np.nan)
+        apart = np.where(self.weight[:, frames] > 0, self.apart(self._simulated(u, frames), frames), 0.0)
+        return np.where(self._counted(frames), np.linalg.norm(apart, axis=-1), np.nan)
+
+    def _counted(self, frames: np.ndarray) -> np.ndarray:
+        """Whether a point moves and is seen then, (K, len(frames)) bool."""
+        return (self.weight[:, frames] > 0).any(-1) & self.moving[:, None]
 
     def _simulated(self, u: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Displacements of the points [m], (K, len(frames), 3)."""
@@ -87,6 +94,12 @@ class Filmed(Observation):
     camera: Camera
     pixels: np.ndarray
     """Where they were seen [px], (K, T, 2), zero where not."""
+    light: Brightness | None = None
+    """How bright they looked; none where that is left aside."""
+
+    def carried_by(self, simulator: Simulator) -> Self:
+        light = self.light.carried_by(simulator) if self.light else None
+        return replace(super().carried_by(simulator), light=light)
 
     def apart(self, moved: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Across the view at the depth of frame 0, and along it [m], (K, len(frames), 3)."""
@@ -110,8 +123,7 @@ def observe(tracks: Tracks, motion: Motion, camera: Camera, simulator: Simulator
     rest = tracks.xyz[:, 0].astype(float)
     usable = np.isfinite(rest).all(1) & tracks.visible[:, 0]
     carry = simulator.carry(np.where(usable[:, None], rest, simulator.rest[0]))
-    support = np.asarray(carry.sum(1)).ravel()
-    usable &= abs(support - 1) < 0.05
+    usable &= abs(simulator.support(carry) - 1) < 0.05
     for j in range(len(motion.radius)):
         usable &= np.linalg.norm(rest - motion.center_rest[j], axis=1) > motion.radius[j]
     if usable.sum() < 10:

@@ -30,6 +30,8 @@ GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
 """How firmly instruments may hold, tried in turn."""
 OPENED = 4
 """How many of the best starts are tried with other moments of release."""
+PULLS = 4
+"""Most iterations on the shape of a pull, before its release is looked at."""
 SETTLED = 4
 """Frames after a release that the first window must hold, or it says nothing of modulus and viscosity."""
 
@@ -99,6 +101,44 @@ def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> 
     return edges[int(np.argmin(others))], x
 
 
+def settle_pull(
+    trial: Trial, x: np.ndarray, phase: np.ndarray, settings: Estimation, history: list, say: Say
+) -> np.ndarray:
+    """x with what shapes a pull and its hold fitted to them: all but moduli, viscosities and moments of release.
+
+    Displacement-driven tissue takes its shape whatever its modulus, which only a release tells; where the shape is
+    off, a release misfits by more than any modulus could mend, and the wrong one looks as good as the right one.
+    """
+    wanted = trial.wanted
+    driven = trial.fitted[phase[trial.fitted] < PHASES.index("release")]
+    slow = np.array([not name.endswith((".E", ".eta", ".release")) for name in wanted.names])
+    if not len(driven) or not slow.any() or slow.all():
+        return x
+    last = int(driven[-1])
+    low, high = wanted.bounds
+
+    def whole(y: np.ndarray) -> np.ndarray:
+        z = x.copy()
+        z[slow] = y
+        return z
+
+    def said(iteration: int, y: np.ndarray, cost: float) -> None:
+        values = {n: float(f"{v:.4g}") for n, v in plain(wanted, whole(y)).items()}
+        history.append({"round": "pull", "last_frame": last, "iteration": iteration, "cost": cost} | values)
+        say(0.06 + 0.06 * iteration / PULLS, 1.0, f"shape of the pull, iteration {iteration}: {values}")
+
+    try:
+        found = gauss_newton(
+            lambda y, worker: trial.residual(whole(y), worker, last), x[slow], prior=wanted.start[slow],
+            spread=wanted.spread[slow], bounds=(low[slow], high[slow]), share=INDEPENDENT, iterations=PULLS,
+            workers=WORKERS, said=said, together=lambda ys: trial.together([whole(y) for y in ys], last),
+        )  # fmt: skip
+    except Breakdown as breakdown:
+        history.append({"round": "pull", "last_frame": last, "cost": None, "broke": str(breakdown)})
+        return x
+    return whole(found.x)
+
+
 def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np.ndarray:
     """The best of a few starting points about `begin`.
 
@@ -112,11 +152,12 @@ def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np
             for r, x in zip(trial.together(points), points, strict=True)
         ]
 
-    say(0.1, 1.0, f"trying {len(points)} starts")
+    say(0.13, 1.0, f"trying {len(points)} starts")
     costs = costs_of(points)
-    more = [y for k in np.argsort(costs, kind="stable")[:OPENED] for y in wanted.openings(points[k])]
-    say(0.18, 1.0, f"trying {len(more)} moments of release")
-    points, costs = points + more, costs + costs_of(more)
+    for about, more_of in (("moments of release", wanted.openings), ("starts close to the best", wanted.closer)):
+        more = [y for k in np.argsort(costs, kind="stable")[:OPENED] for y in more_of(points[k])]
+        say(0.2, 1.0, f"trying {len(more)} {about}")
+        points, costs = points + more, costs + costs_of(more)
     for x, cost in zip(points, costs, strict=True):
         history.append({"round": "start", "cost": number(cost)} | plain(wanted, x))
     if not np.isfinite(costs).any():

@@ -15,8 +15,11 @@ PRIOR_LOG = 1.5
 """Standard deviation of the prior on a logarithm: tissue moduli spread over a factor 4-5 either way."""
 REACH = 2.0
 """How many prior deviations from its start a logarithm may go."""
-FIRST_STEPS, SECOND_STEPS = (-2.4, -1.6, -0.8, 0.0, 0.8), (-1.2, 0.0, 1.2)
-"""Offsets of the first two logarithms in the scan that precedes the descent."""
+FIRST_STEPS, SECOND_STEPS = tuple(0.4 * k for k in range(-6, 3)), (0.0, 1.0, 2.0)
+"""Offsets of the first logarithm in the scan that precedes the descent, and of how the second then lies to it: two
+periods of a ring-down are told from those of one a fifth faster, so wider steps would pass between."""
+CLOSER_STEPS = (-0.2, 0.2)
+"""Offsets of both, about the best of those."""
 OPENING_STEPS = (-0.5, 0.5)
 """The same of the moments of release [frames]."""
 PRIOR_SHARE = 0.3
@@ -71,12 +74,26 @@ class Search:
         return np.maximum(low, self.start - reach), np.minimum(high, self.start + reach)
 
     def starts(self, begin: np.ndarray) -> list[np.ndarray]:
-        """Points to try first: `begin` with its first two logarithms stepped."""
-        steps = [np.zeros(len(begin))]
-        logarithmic = [k for k, (*_, p) in enumerate(self.free) if p.logarithmic]
-        for k, offsets in zip(logarithmic, (FIRST_STEPS, SECOND_STEPS), strict=False):
-            steps = [s + o * np.eye(len(begin))[k] for s in steps for o in offsets]
-        return [np.clip(begin + s, *self.bounds) for s in steps]
+        """Points to try first: `begin` with its first two logarithms stepped, the second along with the first."""
+        first, second, *_ = [*self._logarithms(), None, None]
+        points = []
+        for step in FIRST_STEPS if first is not None else (0.0,):
+            for beside in SECOND_STEPS if second is not None else (0.0,):
+                points.append(self._stepped(begin, step, beside))
+        return points
+
+    def closer(self, begin: np.ndarray) -> list[np.ndarray]:
+        """Points about one of those."""
+        return [self._stepped(begin, step, 0.0) for step in CLOSER_STEPS] if self._logarithms() else []
+
+    def _logarithms(self) -> list[int]:
+        return [k for k, (*_, p) in enumerate(self.free) if p.logarithmic][:2]
+
+    def _stepped(self, begin: np.ndarray, step: float, beside: float) -> np.ndarray:
+        point = begin.copy()
+        for k, by in zip(self._logarithms(), (step, step + beside), strict=False):
+            point[k] += by
+        return np.clip(point, *self.bounds)
 
     def openings(self, begin: np.ndarray) -> list[np.ndarray]:
         """`begin` with the moments of release stepped; none where nothing is let go.

@@ -8,6 +8,7 @@ from threading import Lock
 from typing import Any, Self
 
 import numpy as np
+from scipy.cluster.vq import kmeans2
 
 from surgisim.artifacts.motion import Motion
 from surgisim.estimation.lay import Laying
@@ -23,6 +24,8 @@ from surgisim.physics.catalogue import choose
 WORKERS = 2
 SAFETY = 0.9
 """Share of the largest stable step that is used."""
+REGIONS = 12
+"""Parts of the tissue whose errors are taken to be independent of one another's."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,7 @@ class Trial:
         return self._run(x, worker, last)[0]
 
     def residual(self, x: np.ndarray, worker: int = 0, last: int | None = None) -> np.ndarray | None:
-        """Weighted misfit of the tracks on fitted frames up to `last`, flat; None where x cannot be simulated."""
+        """Weighted misfit on fitted frames up to `last`, flat, tracks first; None where x cannot be simulated."""
         last = int(self.fitted[-1]) if last is None else last
         try:
             run, observation = self._run(x, worker, last)
@@ -104,10 +107,29 @@ class Trial:
             return None
         return self._apart(run, observation, last)
 
+    def of_frames(self, each: np.ndarray) -> np.ndarray:
+        """What each residual's frame has of `each`, (T,), in the order of `residual`, (R,)."""
+        count, light = len(self.observation.rest), getattr(self.observation, "light", None)
+        tracks = np.broadcast_to(each[self.fitted][None, :, None], (count, len(self.fitted), 3)).ravel()
+        return np.concatenate([tracks, np.tile(each[self.fitted], len(light.rest))]) if light else tracks
+
+    @cached_property
+    def regions(self) -> np.ndarray:
+        """Which errors may go together: the part of the tissue of every residual, in their order, (R,) int."""
+        rest, light = self.observation.rest, getattr(self.observation, "light", None)
+        middles, of = kmeans2(rest, min(REGIONS, len(rest)), minit="++", seed=0)
+        tracks = np.repeat(of, 3 * len(self.fitted))
+        if light is None:
+            return tracks
+        near = len(middles) + np.linalg.norm(light.rest[:, None] - middles, axis=-1).argmin(1)
+        return np.concatenate([tracks, np.repeat(near, len(self.fitted))])
+
     def _apart(self, run: Run, observation: Observation, last: int) -> np.ndarray:
         frames = self.fitted[self.fitted <= last]
         r = observation.residual(run.u, frames)
-        return (self.error.whiten(r, frames) if self.error else r).ravel()
+        r = (self.error.whiten(r, frames) if self.error else r).ravel()
+        light = getattr(observation, "light", None)
+        return np.concatenate([r, light.residual(run.u, frames).ravel()]) if light else r
 
     def _run(self, x: np.ndarray, worker: int, last: int | None) -> tuple[Run, Observation]:
         values = self.wanted.values(x)

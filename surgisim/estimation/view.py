@@ -51,12 +51,14 @@ class View:
     def observation(self, seen: Filmed) -> Filmed:
         """What is compared in this view; what one standard deviation is in the picture stays."""
         factor = self.factor(seen.rest)[:, None]
+        light = seen.light.placed(seen.light.rest * self.factor(seen.light.rest)) if seen.light else None
         return replace(
             seen,
             rest=seen.rest * factor[:, 0],
             displacement=seen.displacement * factor,
             weight=seen.weight / factor,
             camera=self.seen_by,
+            light=light,
         )
 
     def columns(self, laid: Columns) -> Columns:

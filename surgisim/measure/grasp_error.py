@@ -23,15 +23,19 @@ def grasp_error(found: Motion, true: Motion, *, scale: float = 1.0) -> GraspErro
         return None
     centers, paths, releases = [], [], []
     for j in range(len(true.radius)):
-        apart = np.linalg.norm(scale * found.center_rest - true.center_rest[j], axis=-1)
-        i = int(np.argmin(apart))
+        i = nearest(found, true, j, scale)
         both = found.active[i] & true.active[j]
-        centers.append(apart[i])
+        centers.append(np.linalg.norm(scale * found.center_rest[i] - true.center_rest[j]))
         paths.append(np.sum((scale * found.position[i] - true.position[j])[both] ** 2, -1))
         releases.append(release(found.active[i]) - release(true.active[j]))
     together = np.concatenate(paths)
     path = float(np.sqrt(together.mean())) if len(together) else float("nan")
     return GraspError(float(max(centers)), path, float(max(releases, key=abs)))
+
+
+def nearest(found: Motion, true: Motion, grip: int, scale: float) -> int:
+    """The found grip whose centre at rest is nearest to that of true grip number `grip`."""
+    return int(np.argmin(np.linalg.norm(scale * found.center_rest - true.center_rest[grip], axis=-1)))
 
 
 def release(active: np.ndarray) -> int:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from surgisim.measure.resample import Estimate
+
 NOT_MEASURED = "not_measured"
 """Group of the numbers that could not be had, with the reason in the place of the protocol."""
 
@@ -23,6 +25,21 @@ def number(
     if series is not None:
         entry["series"] = [_short(v) if math.isfinite(v) else None for v in series]
     return entry
+
+
+def ranged(
+    found: Estimate, unit: str, protocol: str, *, factor: float = 1.0, drawn: str = "points", why_not: str = ""
+) -> dict[str, Any]:
+    """One number with its 90 % interval, "low" and "high", and how many points or frames it is of, "count".
+
+    factor: from the estimate's unit to `unit`. Both ends are None where there are too few for an interval.
+    """
+    spread = f"; 90 % interval of {found.count} {drawn} drawn anew" if found.low is not None else ""
+    entry = number(factor * found.value, unit, protocol + spread, why_not=why_not)
+    if entry["value"] is None:
+        return entry
+    ends = {end: None if (v := getattr(found, end)) is None else _short(factor * v) for end in ("low", "high")}
+    return entry | ends | {"count": found.count}
 
 
 def measured(groups: Mapping[str, Mapping[str, dict[str, Any]]]) -> dict[str, dict[str, Any]]:

@@ -29,6 +29,7 @@ class Run:
     depth: Depth
     tracks: Tracks
     motion: Motion
+    """As estimation fitted it."""
     scene: Scene
     rendered: Frames
     body: Body
@@ -36,6 +37,8 @@ class Run:
     fit: Fit
     replay: Replay
     truth: TruthSeen | None = None
+    found: Motion | None = None
+    """The grip as tracking found it."""
 
     def __post_init__(self) -> None:
         size = self.frames.rgb.shape[:3]

@@ -3,13 +3,21 @@
 from typing import Any
 
 from surgisim.measure.groups.depth import depth
+from surgisim.measure.groups.depth_change import depth_change
 from surgisim.measure.groups.grasp import grasp
+from surgisim.measure.groups.grip_path import grip_path
 from surgisim.measure.groups.inpainting import inpainting
 from surgisim.measure.groups.masking import masking
+from surgisim.measure.groups.perception_by_phase import (
+    masking_by_phase,
+    reconstruction_by_phase,
+    tracking_by_phase,
+)
 from surgisim.measure.groups.physics import physics
 from surgisim.measure.groups.reconstruction import reconstruction
 from surgisim.measure.groups.replay import replay
 from surgisim.measure.groups.simulation import simulation
+from surgisim.measure.groups.simulation_by_phase import simulation_by_phase
 from surgisim.measure.groups.tracking import tracking
 from surgisim.measure.lpips import Lpips
 from surgisim.measure.number import measured
@@ -19,13 +27,13 @@ from surgisim.measure.run import Run
 def score(run: Run, *, lpips: Lpips | None, first: int, progress=lambda *_: None) -> dict[str, dict[str, Any]]:
     """Group -> name -> {"value", "unit", "protocol"[, "series"]}; see `number` for what is missing."""
     asked = {
-        "masking": lambda: masking(run),
+        "masking": lambda: masking(run) | masking_by_phase(run),
         "inpainting": lambda: inpainting(run),
-        "depth": lambda: depth(run),
-        "tracking": lambda: tracking(run),
-        "grasp": lambda: grasp(run),
-        "reconstruction": lambda: reconstruction(run, lpips, first),
-        "simulation": lambda: simulation(run, lpips),
+        "depth": lambda: depth(run) | depth_change(run),
+        "tracking": lambda: tracking(run) | tracking_by_phase(run),
+        "grasp": lambda: grasp(run) | grip_path(run),
+        "reconstruction": lambda: reconstruction(run, lpips, first) | reconstruction_by_phase(run),
+        "simulation": lambda: simulation(run, lpips) | simulation_by_phase(run),
         "replay": lambda: replay(run),
         "physics": lambda: physics(run),
     }

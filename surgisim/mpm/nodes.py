@@ -67,10 +67,17 @@ class Nodes:
         return index, link
 
     def carry(self, points: np.ndarray) -> sparse.csr_matrix:
-        """Interpolation from solid nodes to points [m], (Q, 3), (Q, A); rows far from the body sum to less than 1."""
+        """Interpolation from solid nodes to points [m], (Q, 3), (Q, A); see `support` for how far a point has one."""
         index, link = self.links(points)
         rows = np.repeat(np.arange(len(index)), index.shape[1])
         return sparse.csr_matrix((link[..., 0].ravel(), (rows, index.ravel())), (len(index), len(self.place)))
+
+    def support(self, carry: sparse.csr_matrix) -> np.ndarray:
+        """Sum of the splines' weights in each row of `carry`, (Q,): 1 on the body, less where a point is off it.
+
+        What kinks add there is left out: it bends the displacement and sums to no whole.
+        """
+        return np.asarray(carry[:, : self.rule.shape[1]].sum(1)).ravel()
 
     def displaced(self, u: np.ndarray) -> np.ndarray:
         """Nodal displacement [m], (..., N, 3) or (..., 2 N, 3) once cut, of every node that follows the body.

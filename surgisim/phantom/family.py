@@ -26,6 +26,8 @@ SPACING = 2.8e-3
 """Edge of the finite elements [m]."""
 CLOSED = 0.04
 """The jaws are closed so long before the pull begins [s]."""
+FARTHEST = 0.7
+"""Longest pull, as a share of the tissue's thickness: one of its own thickness turns elements inside out."""
 
 
 def family(seed: int, count: int) -> dict[str, dict[str, Any]]:
@@ -37,13 +39,14 @@ def draw(seed: int, n: int) -> dict[str, Any]:
     """One clip: camera, tissue, pull and picture quality, each from a generator of its own."""
     camera, told = _camera(_generator(seed, n, "camera"))
     fps, times = _times(_generator(seed, n, "times"))
+    tissue = _tissue(_generator(seed, n, "tissue"))
     phantom = {
         "width": WIDTH,
         "height": HEIGHT,
         "fps": fps,
         **camera,
-        **_tissue(_generator(seed, n, "tissue")),
-        **_pull(_generator(seed, n, "pull")),
+        **tissue,
+        **_pull(_generator(seed, n, "pull"), FARTHEST * tissue["thickness"]),
         **times,
         **_picture(_generator(seed, n, "picture")),
     }
@@ -105,10 +108,10 @@ def _tissue(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _pull(rng: np.random.Generator) -> dict[str, float]:
-    """5 to 11 mm, from along the tissue to steeply off it."""
+def _pull(rng: np.random.Generator, farthest: float) -> dict[str, float]:
+    """5 to 11 mm and at most `farthest` [m], from along the tissue to steeply off it."""
     return {
-        "pull": rng.uniform(5e-3, 11e-3),
+        "pull": rng.uniform(5e-3, min(11e-3, farthest)),
         "lift": rng.uniform(0.0, 1.2),
         "grip_radius": rng.uniform(4e-3, 6.5e-3),
     }

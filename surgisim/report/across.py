@@ -8,7 +8,7 @@ from typing import Any, Literal
 from surgisim.artifacts.metrics import Metrics
 from surgisim.problem import Problem
 from surgisim.report.charts.compare import compare
-from surgisim.report.headline import shown
+from surgisim.report.digits import shown
 from surgisim.report.page import template
 
 
@@ -25,6 +25,8 @@ MEASURES = (
     Measure("depth", "true_relative", "depth off the truth, mean", "lower"),
     Measure("depth", "given_relative", "depth off the given one, mean", "lower"),
     Measure("tracking", "median", "tracks off the truth, median", "lower"),
+    Measure("depth", "change_pull_share", "change of depth of moving points off the truth, load and after", "lower"),
+    Measure("grasp", "path_fitted_pull_share", "grip's path off the true one, share of its length", "lower"),
     Measure("grasp", "center", "gripped centre off the truth", "lower"),
     Measure("reconstruction", "psnr_between", "scene, PSNR, held out between", "higher"),
     Measure("reconstruction", "ssim_between", "scene, SSIM, held out between", "higher"),
@@ -37,6 +39,16 @@ MEASURES = (
     Measure("simulation", "tracked_held_out", "replay off tracked points, held out, median", "lower"),
     Measure("simulation", "tracked_held_out_moving", "replay off tracked moving points, held out, mean", "lower"),
     Measure("simulation", "tracked_released_moving", "replay off tracked moving points, after the release", "lower"),
+    Measure(
+        "simulation",
+        "true_held_out_pull_moving_of_still",
+        "replay off true moving points, load and after, % of a still body's",
+        "lower",
+    ),
+    Measure(
+        "simulation", "tracked_held_out_pull_moving_px", "replay off tracked moving points, load and after", "lower"
+    ),
+    Measure("simulation", "tracked_held_out_pull_moving_of_still_px", "the same, % of a still body's", "lower"),
     Measure("simulation", "psnr_between", "replay, PSNR, held out between", "higher"),
     Measure("simulation", "psnr_after", "replay, PSNR, held out after", "higher"),
     Measure("simulation", "ssim_between", "replay, SSIM, held out between", "higher"),

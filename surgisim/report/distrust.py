@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surgisim.report.headline import shown
+from surgisim.measure.spans import SPANS, THREE
+from surgisim.report.digits import shown, spread
 from surgisim.report.story import Story
 
 
@@ -134,12 +135,30 @@ def _replay(story: Story) -> Iterator[Doubt]:
     if not story.replayed:
         yield Doubt(True, "The replay was not rendered over the recording's frames, so pictures cannot be compared.")
     kind = "tracked" if story.run.truth is None else "true"
-    for part, when in (("used", "used frames"), ("released", "frames after the release")):
-        value = story.value("simulation", f"{kind}_{part}_moving_px")
-        still = story.value("simulation", f"{kind}_{part}_moving_still_px")
-        if value is not None and still is not None and value >= still:
-            yield Doubt(
-                True,
-                f"On {when} the replay follows the {kind} points no better than a body that never moves "
-                f"({shown(value)} against {shown(still)} px).",
-            )
+    covered = story.value("simulation", f"{kind}_moving_on_body")
+    if covered is not None and covered < 0.8:
+        yield Doubt(
+            True,
+            f"The body has only {covered:.0%} of the {kind} points that move: errors of the replay say nothing of the "
+            "others.",
+        )
+    value = story.value("simulation", f"{kind}_used_moving_px")
+    still = story.value("simulation", f"{kind}_used_moving_still_px")
+    if value is not None and still is not None and value >= still:
+        yield Doubt(
+            True,
+            f"On used frames the replay follows the {kind} points no better than a body that never moves "
+            f"({shown(value)} against {shown(still)} px).",
+        )
+    for span in THREE:
+        for other, words in (("still", "a body that never moves"), ("rigid", "one that goes rigidly with the grip")):
+            # Let go, a rigid body is a still one.
+            if (span, other) == ("released", "rigid"):
+                continue
+            entry = story.metrics.values.get("simulation", {}).get(f"{kind}_held_out_{span}_moving_of_{other}_px")
+            if entry and entry["low"] is not None and entry["low"] >= 100:
+                yield Doubt(
+                    True,
+                    f"On frames never used {SPANS[span][1]} the replay follows the {kind} points worse than {words} "
+                    f"({shown(entry['value'])} % of its error, {spread(entry)}).",
+                )

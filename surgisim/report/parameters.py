@@ -5,7 +5,7 @@ from typing import Any
 
 from surgisim.artifacts.fit import Fit
 from surgisim.artifacts.physics import Physics
-from surgisim.report.headline import shown
+from surgisim.report.digits import shown
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,9 @@ class Parameter:
     true: str
     """The true value, on an invented clip."""
     mark: str
-    """good where that is inside the interval, poor where it is not and the number is told, else plain."""
+    """good where that is inside the interval, poor where it is not, told or not; plain without a truth."""
+    inside: str
+    """The same in a word."""
     phases: str
 
 
@@ -46,7 +48,8 @@ def _parameter(name: str, entry: dict[str, Any]) -> Parameter:
         told="not said" if told is None else "yes" if told else "no",
         phases=_phases(entry.get("phases")),
         true=_text(entry.get("true")) if "true" in entry else "",
-        mark="plain" if "inside" not in entry else "good" if entry["inside"] else "poor" if told else "plain",
+        mark="plain" if "inside" not in entry else "good" if entry["inside"] else "poor",
+        inside="" if "inside" not in entry else "inside" if entry["inside"] else "outside",
     )
 
 

@@ -1,11 +1,12 @@
 """Every number of the run as tables, each with its unit and protocol."""
 
-from dataclasses import dataclass
 from typing import Any
 
 from surgisim.artifacts.metrics import Metrics
 from surgisim.measure.number import NOT_MEASURED
-from surgisim.report.headline import shown
+from surgisim.report.digits import shown, spread
+from surgisim.report.phase_tables import in_phase_tables, phase_tables
+from surgisim.report.tables_base import Cell, Table
 
 PARTS = {
     "used": "used",
@@ -16,23 +17,9 @@ PARTS = {
 }
 
 
-@dataclass(frozen=True)
-class Cell:
-    text: str
-    protocol: str = ""
-
-
-@dataclass(frozen=True)
-class Table:
-    title: str
-    head: list[str]
-    rows: list[tuple[str, list[Cell]]]
-    note: str = ""
-
-
 def grids(metrics: Metrics) -> list[Table]:
-    """Numbers that make a grid: pictures and motions, by part of the recording."""
-    tables = [_pictures(metrics.values)]
+    """Numbers that make a grid: by phase, then pictures and motions by part of the recording."""
+    tables = [*phase_tables(metrics.values), _pictures(metrics.values)]
     for kind, title in (("true", "Replay against true points"), ("tracked", "Replay against tracked points")):
         tables.append(_motions(metrics.values.get("simulation", {}), kind, title))
     return [t for t in tables if t.rows]
@@ -43,22 +30,26 @@ def lists(metrics: Metrics) -> list[Table]:
     gridded = _gridded(metrics.values)
     tables = []
     for group, entries in metrics.values.items():
+        if group == NOT_MEASURED:
+            tables.append(_absent(entries))
+            continue
         rows = [
             (words(name), [_cell(entry), Cell(_unit(entry)), Cell(entry["protocol"])])
             for name, entry in entries.items()
             if (group, name) not in gridded
         ]
-        if group == NOT_MEASURED:
-            tables.append(
-                Table(
-                    "Not measured",
-                    ["number", "why not"],
-                    [(words(n.replace(".", ": ")), [c[2]]) for n, c in rows],
-                )
-            )
-        elif rows:
+        if rows:
             tables.append(Table(words(group).capitalize(), ["number", "value", "unit", "protocol"], rows))
     return tables
+
+
+def _absent(entries: dict[str, Any]) -> Table:
+    """What was not measured, those with the same reason in one row."""
+    names: dict[str, list[str]] = {}
+    for name, entry in entries.items():
+        names.setdefault(entry["protocol"], []).append(words(name.replace(".", ": ", 1)))
+    rows = [(", ".join(each), [Cell(why)]) for why, each in names.items()]
+    return Table("Not measured", ["numbers", "why not"], rows)
 
 
 def words(name: str) -> str:
@@ -110,13 +101,13 @@ def _gridded(values: dict[str, Any]) -> set[tuple[str, str]]:
         (g, f"{m}_{p}") for g in ("reconstruction", "simulation") for m in ("psnr", "ssim", "lpips") for p in PARTS
     }
     motions = {("simulation", f"{k}_{p}{s}") for k in ("true", "tracked") for p in PARTS for s in MOTIONS}
-    return pictures | motions
+    return pictures | motions | in_phase_tables()
 
 
 def _cell(entry: dict[str, Any] | None) -> Cell:
     if entry is None or entry["value"] is None:
         return Cell("–")
-    return Cell(shown(entry["value"]), entry["protocol"])
+    return Cell(shown(entry["value"]), entry["protocol"], spread(entry))
 
 
 def _unit(entry: dict[str, Any]) -> str:

@@ -1,4 +1,7 @@
-"""Pictures of a moved body: every splat is carried, turned and stretched by the grid."""
+"""Pictures of a moved body: every splat is carried, turned and stretched by the simulation."""
+
+from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -8,52 +11,80 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.scene import Scene
 from surgisim.gaussians.attributes import drawn
 from surgisim.gaussians.rasterise import Image, render, to_bytes
-from surgisim.mpm.simulator import Simulator
+from surgisim.mpm.nodes import Nodes
 
 COVERED = 0.9
 """Opacity of the surface from which nothing behind it shows: the scene was fitted before black."""
+Shade = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Colours, sRGB (G, 3), of splats at moved means [m], (G, 3), with deformation gradients (G, 3, 3)."""
+
+
+class Light(Protocol):
+    """What lights the splats."""
+
+    def shade(self, rest: np.ndarray, color: np.ndarray) -> Shade:
+        """How splats at rest [m], (G, 3), of a colour, sRGB (G, 3), look once they are moved."""
+
+
+class Carried:
+    """Rest points that hang on a body: on its grid's splines, and on the kinks at the skin of what is gripped."""
+
+    def __init__(self, rest: np.ndarray, simulator: Nodes) -> None:
+        self.rest = np.asarray(rest, float)
+        self.index, self.link = simulator.links(self.rest)
+
+    def at(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions [m], (Q, 3), and deformation gradients (Q, 3, 3) at solid nodes' displacements u [m], (A, 3)."""
+        here = u[self.index].astype(float)
+        moved = self.rest + np.einsum("qk,qka->qa", self.link[..., 0], here)
+        return moved, np.eye(3) + np.einsum("qka,qkb->qab", here, self.link[..., 1:])
 
 
 class Splats:
-    """Gaussians bound to a body's grid."""
+    """Gaussians bound to a body."""
 
-    def __init__(self, mean, rotation, scale, opacity, color, simulator: Simulator) -> None:
-        self.mean, self.opacity, self.color = np.asarray(mean, float), opacity, color
+    def __init__(self, mean, rotation, scale, opacity, color, simulator: Nodes, shade: Shade | None = None) -> None:
+        self.carried, self.opacity, self.color, self.shade = Carried(mean, simulator), opacity, color, shade
         turn = Rotation.from_quat(np.asarray(rotation, float), scalar_first=True).as_matrix()
         self.factor = turn * np.asarray(scale, float)[:, None, :]
-        self.nodes, self.weight, self.gradient = simulator.stencil(self.mean)
 
-    def seen(self, displacement: np.ndarray, camera: Camera) -> Image:
-        """The image at a nodal displacement [m], (N or 2 N, 3)."""
-        u = displacement[self.nodes]
-        mean = self.mean + np.einsum("qk,qka->qa", self.weight, u)
-        F = np.eye(3) + np.einsum("qka,qkb->qab", u, self.gradient)
+    def seen(self, u: np.ndarray, camera: Camera) -> Image:
+        """The image at displacements of the solid nodes [m], (A, 3)."""
+        mean, F = self.carried.at(u)
         # A splat's covariance M M^T becomes (F M)(F M)^T; its axes are the left singular vectors.
         axes, radii, _ = np.linalg.svd(F @ self.factor)
         axes = axes * np.sign(np.linalg.det(axes))[:, None, None]
         rotation = Rotation.from_matrix(axes).as_quat(scalar_first=True)
-        return render(mean, rotation, np.maximum(radii, 1e-7), self.opacity, self.color, camera)
+        color = self.color if self.shade is None else self.shade(mean, F)
+        return render(mean, rotation, np.maximum(radii, 1e-7), self.opacity, color, camera)
 
 
 class Drawn:
-    """The scene, and behind it, where it opens, the body's interior."""
+    """The scene, and behind it, where it opens, the body's interior and what lies beyond the picture's edge."""
 
-    def __init__(self, scene: Scene, body: Body, simulator: Simulator, interior: bool) -> None:
-        self.surface = Splats(*drawn(scene), simulator)
-        inside = ~body.surface
-        self.interior = None
-        if interior and inside.any():
-            count = int(inside.sum())
-            radius = 0.5 * np.cbrt(body.volume[inside].astype(float))
-            still = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
-            radii, opacity = np.repeat(radius[:, None], 3, 1), np.full(count, 0.95)
-            self.interior = Splats(body.rest[inside], still, radii, opacity, body.color[inside], simulator)
+    def __init__(
+        self, scene: Scene, rim: Scene, body: Body, simulator: Nodes, interior: bool, light: Light | None = None
+    ) -> None:
+        """rim: see `gaussians.rim`; light: None leaves every colour as the rest frame has it."""
+        shade = (lambda mean, color: None) if light is None else light.shade
+        front, behind = drawn(scene), drawn(rim)
+        if interior:
+            behind = [np.concatenate(pair) for pair in zip(behind, _inside(body), strict=True)]
+        self.front, self.behind = (Splats(*s, simulator, shade(s[0], s[-1])) for s in (front, behind))
 
-    def picture(self, displacement: np.ndarray, camera: Camera) -> np.ndarray:
-        """The frame at a nodal displacement [m], (N or 2 N, 3), as (H, W, 3) uint8."""
-        front = self.surface.seen(displacement, camera)
-        if self.interior is None or front.alpha.min() >= COVERED:
+    def picture(self, u: np.ndarray, camera: Camera) -> np.ndarray:
+        """The frame at displacements of the solid nodes [m], (A, 3), as (H, W, 3) uint8."""
+        front = self.front.seen(u, camera)
+        if front.alpha.min() >= COVERED:
             return to_bytes(front.rgb)
-        behind = self.interior.seen(displacement, camera)
         gap = np.maximum(0.0, 1 - front.alpha / COVERED)[..., None]
-        return to_bytes(front.rgb + gap * behind.rgb)
+        return to_bytes(front.rgb + gap * self.behind.seen(u, camera).rgb)
+
+
+def _inside(body: Body) -> tuple[np.ndarray, ...]:
+    """The particles behind the surface as round splats: mean, rotation, scale, opacity and colour."""
+    inside = ~body.surface
+    count = int(inside.sum())
+    radius = 0.5 * np.cbrt(body.volume[inside].astype(float))
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
+    return body.rest[inside], still, np.repeat(radius[:, None], 3, 1), np.full(count, 0.95), body.color[inside]

@@ -6,18 +6,23 @@ import numpy as np
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.frames import Frames
+from surgisim.artifacts.masks import Masks
 from surgisim.artifacts.material import Material
 from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.replay import Replay
 from surgisim.artifacts.scene import Scene
 from surgisim.config.simulation import Simulation
+from surgisim.gaussians.rim import beyond
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import SKIN, Prepared, checked_per_frame, prepare, theta_of, values_of
 from surgisim.mpm.simulator import Run, Simulator
 from surgisim.physics.catalogue import choose, defaults
 from surgisim.problem import Problem
+from surgisim.simulation.draw import Carried, Drawn
 from surgisim.simulation.operation import Plan, plan
+from surgisim.simulation.relight import Light, find_light
 
 THREADS = 2
 """Threads of a run on a CPU; fixed, so that a replay has the same bytes on every number of cores."""
@@ -32,8 +37,13 @@ def replay(
     camera: Camera,
     settings: Simulation,
     progress: Callable[[float, float, str], None],
+    *,
+    recording: tuple[Frames, Masks] | None = None,
 ) -> Replay:
-    """The body at every frame of the recorded motion, or of `settings.operation`."""
+    """The body at every frame of the recorded motion, or of `settings.operation`.
+
+    recording: what the lamp is learned from; without it, colours stay as the rest frame has them.
+    """
     if not np.isclose(physics.grid["spacing"], body.spacing, rtol=1e-4):
         raise Problem(
             f"physics.json was fitted on a grid of {physics.grid['spacing']:.6f} m, but body.npz is made for "
@@ -43,41 +53,39 @@ def replay(
     if len(theta) != len(body.rest):
         raise Problem(f"material.npz has {len(theta)} particles, but body.npz has {len(body.rest)}. Pass a pair.")
     task = (
-        Plan(motion, np.zeros((camera.frames, 3)), None, 0)
+        _recorded(motion, camera)
         if settings.operation is None
         else plan(settings.operation, body.rest, body.surface, camera, body.spacing)
     )
     per_frame = checked_per_frame(physics, material, camera.fps) * settings.refine_step
-    parts = _parts(body, scene, physics, task, settings.device)
-    path = parts[0].drive(
-        task.motion,
-        values_of(physics),
-        fps=camera.fps,
-        per_frame=per_frame,
-        frames=len(task.base),
-        held=material.held,
-        grip=physics.grip,
-        firm=False,
-    )
-    clock = np.arange(path.steps + 1) / per_frame
-    path.path[0] = np.stack([np.interp(clock, np.arange(len(task.base)), task.base[:, a]) for a in range(3)], -1)
+    rim = beyond(scene, camera)
+    parts = _parts(body, [scene, rim], physics, task, settings.device)
+    path = _path(parts[0], task, physics, material, camera, per_frame)
     states, whole = _march([p.simulator for p in parts], theta, path, task, lambda d, t, s: progress(0.5 * d, t, s))
     frames = len(path.path[0]) // per_frame + 1
+    light = None
+    if recording is not None and settings.render and settings.relight:
+        recorded = [run.u[k] for _, run, k in (states[t] for t in range(frames))]
+        if settings.operation is not None:
+            again = _recorded(motion, camera)
+            path = _path(parts[0], again, physics, material, camera, per_frame)
+            recorded = whole.run(theta, path).u
+        light = find_light(scene, camera, body.spacing, whole, recorded, *recording)
+        progress(0.5, 1.0, f"lamp: {light.words}")
     position, nodes, smallest, energy, rgb = [], [], [], [], []
     looks = {}
     for t in range(frames):
         simulator, run, k = states[t]
         key = id(simulator)
         if key not in looks:
-            looks[key] = _Look(simulator, body, scene, settings, physics, theta)
-        full = simulator.displaced(run.u[k])
-        moved, least, joules = looks[key].measure(full, run.v[k])
+            looks[key] = _Look(simulator, body, (scene, rim), settings, physics, theta, light)
+        moved, least, joules = looks[key].measure(run.u[k], run.v[k])
         position.append(moved.astype(np.float32))
-        nodes.append(full[: simulator.grid.count].astype(np.float32))
+        nodes.append(simulator.displaced(run.u[k])[: simulator.grid.count].astype(np.float32))
         smallest.append(least)
         energy.append(joules)
         if settings.render:
-            rgb.append(looks[key].drawn.picture(full, camera))
+            rgb.append(looks[key].drawn.picture(run.u[k], camera))
         progress(0.5 + 0.5 * (t + 1) / frames, 1.0, f"drawing frame {t + 1}/{frames}")
     grid = whole.grid
     picture = np.stack(rgb) if rgb else np.zeros((0, camera.height, camera.width, 3), np.uint8)
@@ -94,13 +102,35 @@ def replay(
     )
 
 
-def _parts(body: Body, scene: Scene, physics: Physics, task: Plan, device: str) -> list[Prepared]:
+def _recorded(motion: Motion, camera: Camera) -> Plan:
+    return Plan(motion, np.zeros((camera.frames, 3)), None, 0)
+
+
+def _path(made: Prepared, task: Plan, physics: Physics, material: Material, camera: Camera, per_frame: int) -> Drive:
+    """The boundary condition of a task at every step."""
+    path = made.drive(
+        task.motion,
+        values_of(physics),
+        fps=camera.fps,
+        per_frame=per_frame,
+        frames=len(task.base),
+        held=material.held,
+        grip=physics.grip,
+        firm=False,
+    )
+    clock = np.arange(path.steps + 1) / per_frame
+    path.path[0] = np.stack([np.interp(clock, np.arange(len(task.base)), task.base[:, a]) for a in range(3)], -1)
+    return path
+
+
+def _parts(body: Body, scenes: list[Scene], physics: Physics, task: Plan, device: str) -> list[Prepared]:
     """The whole body and, when something is cut, the cut one."""
+    carried = np.concatenate([s.mean for s in scenes]).astype(float)
     make = [None] if task.cut is None else [None, task.cut]
     return [
         prepare(
             body, tuple(physics.terms), density=physics.density, gravity=tuple(physics.gravity),
-            carried=scene.mean.astype(float), cut=cut, device=device, form=physics.form, threads=THREADS,
+            carried=carried, cut=cut, device=device, form=physics.form, threads=THREADS,
             grips=task.motion,
             skin=SKIN,
         )
@@ -130,13 +160,13 @@ class _Look:
         self,
         simulator: Simulator,
         body: Body,
-        scene: Scene,
+        scenes: tuple[Scene, Scene],
         settings: Simulation,
         physics: Physics,
         theta: np.ndarray,
+        light: Light | None,
     ) -> None:
-        self.simulator, self.body = simulator, body
-        self.nodes, self.weight, self.gradient = simulator.stencil(body.rest.astype(float))
+        self.body, self.particles = body, Carried(body.rest, simulator)
         self.mass = simulator.mass.numpy()
         self.laws = []
         column = 0
@@ -147,15 +177,11 @@ class _Look:
             if term.energy:
                 self.laws.append((term.energy, values))
         if settings.render:
-            from surgisim.simulation.draw import Drawn
+            self.drawn = Drawn(*scenes, body, simulator, settings.interior, light)
 
-            self.drawn = Drawn(scene, body, simulator, settings.interior)
-
-    def measure(self, full: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, float, tuple[float, float]]:
+    def measure(self, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, float, tuple[float, float]]:
         """Particle positions [m], (P, 3); smallest det F; kinetic and elastic energy [J]."""
-        u = full[self.nodes]
-        moved = self.body.rest + np.einsum("pk,pka->pa", self.weight, u)
-        F = np.eye(3) + np.einsum("pka,pkb->pab", u, self.gradient)
+        moved, F = self.particles.at(u)
         kinetic = 0.5 * float((self.mass * (v.astype(float) ** 2).sum(-1)).sum())
         elastic = sum(float((e(F, **values) * self.body.volume).sum()) for e, values in self.laws)
         return moved, float(np.linalg.det(F).min()), (kinetic, elastic)

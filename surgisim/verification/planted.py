@@ -80,7 +80,7 @@ def found(seed: int, model: np.ndarray) -> dict:
     tried, solution = fitted(scene, SPACING, seen, split, last, seed=seed)
     table_ = identifiability(
         solution, tried.wanted, phase_of=phase_of(tried), phase_names=PHASES, density=DENSITY,
-        length=scene.shape.thickness, independent=INDEPENDENT, model={"grid": model},
+        length=scene.shape.thickness, independent=INDEPENDENT, region=tried.regions, model={"grid": model},
     )  # fmt: skip
     true = {"ratio": split.ratio, "eta_over_E": scene.law.eta / scene.law.E, "nu": scene.law.nu, "E": scene.law.E}
     keys = {

@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from surgisim.estimation.gauss_newton import Solution
-from surgisim.estimation.identify import identifiability, in_words
+from surgisim.estimation.identify import identifiability, in_words, regional
 from surgisim.estimation.search import search
 from surgisim.estimation.support import Support
 
 
-def told(model=None):
+def told(model=None, phase="release"):
     """The table of a fit whose residuals tell every parameter to a hundredth of its search space."""
     wanted = search(["corotated", "newtonian"], {}, [])
     slope = np.vstack([100 * np.eye(3)] * 50)
     solution = Solution(wanted.start, np.full(len(slope), 0.5), slope)
-    phase = np.zeros(len(slope), int)
+    one = np.zeros(len(slope), int)
     return identifiability(
-        solution, wanted, phase_of=phase, phase_names=("load",), density=1050.0, length=0.015, independent=0.02,
-        model=model,
+        solution, wanted, phase_of=one, phase_names=(phase,), density=1050.0, length=0.015, independent=0.02,
+        region=np.repeat(np.arange(10), 15), model=model,
     )  # fmt: skip
 
 
@@ -44,3 +44,26 @@ def test_what_an_interval_rests_on_is_named():
     assert table["corotated.nu"]["rests_on"] == {}
     words = in_words(table, Support(0.01, 0.0, False), 1.0, 20, 1e-3, 1e-4, None)
     assert "corotated.E" in next(part for part in words.split("How far ")[1:] if part.endswith("focal length."))
+
+
+def test_where_regions_agree_intervals_are_those_of_the_noise_and_where_they_do_not_wider():
+    rng = np.random.default_rng(0)
+    J, spread, share = rng.normal(size=(1200, 3)), np.full(3, 10.0), 0.5
+    region = np.repeat(np.arange(12), 100)
+    noise = rng.normal(size=1200) / np.sqrt(share)
+    plain = np.linalg.inv(share * J.T @ J + np.eye(3) / 100)
+    agreeing = regional(J, noise, share, spread, region)
+    assert np.sqrt(np.diag(agreeing) / np.diag(plain)).min() > 0.9
+    assert np.sqrt(np.diag(agreeing) / np.diag(plain)).max() < 1.7
+    apart = noise + 0.5 * J[:, 0] * np.where(region % 2, 1.0, -1.0)
+    wide = np.sqrt(np.diag(regional(J, apart, share, spread, region)) / np.diag(plain))
+    assert wide[0] > 2.5
+    assert wide[1:].max() < 2
+
+
+def test_no_viscosity_is_told_by_tissue_that_is_driven_all_the_time():
+    free, driven = told(), told(phase="load")
+    for name in ("corotated.E", "newtonian.eta", "newtonian.eta / corotated.E"):
+        assert free[name]["told"]
+        assert not driven[name]["told"]
+    assert driven["corotated.nu"]["told"]

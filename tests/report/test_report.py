@@ -17,8 +17,9 @@ from surgisim.measure.score import score
 from surgisim.measure.truth_seen import seen
 from surgisim.report.across import page as summary
 from surgisim.report.across import table
+from surgisim.report.digits import shown
 from surgisim.report.distrust import distrust
-from surgisim.report.headline import headline, shown
+from surgisim.report.headline import headline
 from surgisim.report.moments import moments
 from surgisim.report.page import page
 from surgisim.report.story import Story
@@ -26,7 +27,7 @@ from surgisim.report.views import balls, look
 
 COST = {"masking": {"seconds": 12.5, "peak_mb": 345.0}, "depth": {"seconds": 3.0}}
 LOST = Motion(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 12, 3)), np.zeros((0, 12), bool), np.zeros(0), "none")
-NAMES = [f.name for f in dataclasses.fields(Run) if f.name != "truth"]
+NAMES = [f.name for f in dataclasses.fields(Run) if f.name not in ("truth", "found")]
 
 
 def story(made, **changed) -> Story:

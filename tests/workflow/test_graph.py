@@ -35,9 +35,11 @@ def test_variants_share_what_they_do_not_change(tree):
     made = {}
     for stage, *where in tree.plan():
         made.setdefault(stage, set()).add(where[-1] if where else "")
-    assert made["masking"] == made["depth"] == made["tracking"] == {"main"}
-    assert made["reconstruction"] == {"main", "no_trajectory", "no_anisotropy", "no_both"}
-    assert made["estimation"] == set(VARIANTS)
+    assert made["masking"] == made["inpainting"] == {"main"}
+    assert made["depth"] == made["tracking"] == {"main", "near_light"}
+    assert made["reconstruction"] == {"main", "no_trajectory", "no_anisotropy", "no_both", "near_light"}
+    assert made["estimation"] == set(VARIANTS) - {"no_relight"}
+    assert made["simulation"] == set(VARIANTS)
     assert made["evaluation"] == made["report"] == set(VARIANTS)
 
 
@@ -142,7 +144,16 @@ def test_a_mistake_in_the_config_is_one_sentence(tree):
 
 CONCEALED = {"invent", "seals", "shuffle", "shorten", "diagnosis", "diagnosis_report", "score", "scoreboard", "pooled"}
 CONCEALED |= {"robustness", "metamorphic", "perturb", "draws", "draw", "self_consistency"}
-CONCEALED |= {"interval_coverage", "known", "known_direct", "known_score", "known_board", "ablations", "recorded"}
+CONCEALED |= {
+    "interval_coverage",
+    "clip_table",
+    "known",
+    "known_direct",
+    "known_score",
+    "known_board",
+    "ablations",
+    "recorded",
+}
 AGAIN = {
     "verification",
     "verification_case",
@@ -155,7 +166,7 @@ AGAIN = {
 }
 """Rules that run the module of another's name."""
 ASKED_FOR = {"blind", "blind_shuffled", "blind_ablations", "blind_phases", "blind_pooled", "blind_real"}
-ASKED_FOR |= {"clip_diagnoses", "coverage"}
+ASKED_FOR |= {"clip_diagnoses", "coverage", "real_clips"}
 TAKEN_OVER = {"body", "body_again"}
 """The rule `invent` with other files: bodies whose answers are known to whoever develops."""
 """Rules without a stage of their own: what `snakemake NAME` makes."""

@@ -47,6 +47,7 @@ rule simulation:
         motion=upstream("estimation", "motion.npz"),
         camera=upstream("ingest", "camera.json"),
         frames=upstream("ingest", "frames.npz"),
+        masks=upstream("masking", "masks.npz"),
     output:
         replay="results/{clip}/{variant}/simulation/replay.npz",
         video=report(
@@ -79,6 +80,6 @@ rule simulation:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/simulation.py"'
         " --body {input.body} --scene {input.scene} --material {input.material}"
         " --physics {input.physics} --motion {input.motion} --camera {input.camera}"
-        " --frames {input.frames} --replay {output.replay} --video {output.video}"
+        " --frames {input.frames} --masks {input.masks} --replay {output.replay} --video {output.video}"
         " --final {output.final} --yt {output.yt}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"

@@ -18,6 +18,7 @@ rule evaluation:
         fit=upstream("estimation", "fit.json"),
         replay=upstream("simulation", "replay.npz"),
         truth=truth,
+        found=upstream("tracking", "motion.npz"),
     output:
         metrics=report(
             "results/{clip}/{variant}/evaluation/metrics.json",
@@ -44,7 +45,8 @@ rule evaluation:
         " --inpainted {input.inpainted} --depth {input.depth} --tracks {input.tracks}"
         " --motion {input.motion} --scene {input.scene} --rendered {input.rendered}"
         " --body {input.body} --physics {input.physics} --fit {input.fit} --replay {input.replay}"
-        " {params.truth} --benchmarks {params.benchmarks} --metrics {output.metrics}"
+        " {params.truth} --found {input.found} --benchmarks {params.benchmarks}"
+        " --metrics {output.metrics}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
 from surgisim.measure.groups.depth import scale_to_truth
 from surgisim.measure.number import number
@@ -35,7 +36,10 @@ def physics(run: Run) -> dict[str, dict[str, Any]]:
     if told:
         inside = sum(e["inside"] for e in told)
         how = f"of {len(told)} numbers that are told and whose truth is known, the share inside their 90 % intervals"
-        entries["told_inside"] = number(inside / len(told), "1", how)
+        # Wilson, Probable inference, the law of succession, and statistical inference, JASA 22 (1927).
+        ends = binomtest(inside, len(told)).proportion_ci(0.9, "wilson")
+        entries["told_inside"] = number(inside / len(told), "1", how + "; Wilson's 90 % interval")
+        entries["told_inside"] |= {"low": float(ends.low), "high": float(ends.high), "count": len(told)}
     return entries
 
 

@@ -3,7 +3,7 @@
 from typing import Any
 
 from surgisim.report.board.page import told
-from surgisim.report.headline import shown
+from surgisim.report.digits import shown
 from surgisim.report.page import template
 
 WORDS = {

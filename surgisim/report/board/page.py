@@ -5,7 +5,8 @@ import io
 from typing import Any
 
 from surgisim.report.board import charts
-from surgisim.report.headline import Card, shown
+from surgisim.report.digits import shown
+from surgisim.report.headline import Card
 from surgisim.report.page import template
 
 Board = dict[str, Any]

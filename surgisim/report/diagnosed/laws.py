@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from surgisim.artifacts.verdict import Effect
-from surgisim.report.headline import shown
+from surgisim.report.digits import shown
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,8 @@
 from surgisim.report.diagnosed import goodness, places, times
 from surgisim.report.diagnosed.case import Diagnosed
 from surgisim.report.diagnosed.laws import law
-from surgisim.report.headline import Card, shown
+from surgisim.report.digits import shown
+from surgisim.report.headline import Card
 from surgisim.report.page import template
 
 BADGE = {

@@ -1,0 +1,33 @@
+"""Which pixels show tissue that the simulation moved."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from surgisim.artifacts.body import Body
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.replay import Replay
+
+MOVED = 0.25
+"""Share of the frame's largest displacement from which the visible surface counts as moved."""
+LEAST = 0.5
+"""Largest displacement below which nothing counts as moved in a frame [px at its depth]."""
+REACH = 1.5
+"""A pixel further than so many grid spacings from every particle of the surface shows no surface."""
+
+
+def moved_region(replay: Replay, body: Body, camera: Camera) -> np.ndarray:
+    """(T, H, W) bool: pixels whose nearest particle of the seen surface, where it is then, moved from its rest place by
+    at least `MOVED` of the frame's largest displacement of the surface."""
+    y, x = np.mgrid[: camera.height, : camera.width]
+    pixels = np.stack([x.ravel(), y.ravel()], 1)
+    region = np.zeros((len(replay.time), camera.height, camera.width), bool)
+    rest = body.rest[body.surface].astype(float)
+    for t, position in enumerate(replay.position[:, body.surface]):
+        moved = np.linalg.norm(position - rest, axis=1)
+        pixel = camera.fx / position[:, 2]
+        if len(moved) == 0 or (moved * pixel).max() < LEAST:
+            continue
+        away, near = cKDTree(camera.project(position)).query(pixels)
+        shown = (moved[near] >= MOVED * moved.max()) & (away <= REACH * body.spacing * pixel[near])
+        region[t] = shown.reshape(region.shape[1:])
+    return region
