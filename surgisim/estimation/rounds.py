@@ -28,8 +28,8 @@ NEARER = (0.0, -0.7, -1.4)
 """How far the grip comes nearer there, in spreads of its prior."""
 GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
 """How firmly instruments may hold, tried in turn."""
-OPENED = 4
-"""How many of the best starts are tried with other moments of release."""
+CLOSELY = 4
+"""About how many of the best starts closer ones are tried."""
 PULLS = 4
 """Most iterations on the shape of a pull, before its release is looked at."""
 SETTLED = 4
@@ -154,10 +154,9 @@ def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np
 
     say(0.13, 1.0, f"trying {len(points)} starts")
     costs = costs_of(points)
-    for about, more_of in (("moments of release", wanted.openings), ("starts close to the best", wanted.closer)):
-        more = [y for k in np.argsort(costs, kind="stable")[:OPENED] for y in more_of(points[k])]
-        say(0.2, 1.0, f"trying {len(more)} {about}")
-        points, costs = points + more, costs + costs_of(more)
+    more = [y for k in np.argsort(costs, kind="stable")[:CLOSELY] for y in wanted.closer(points[k])]
+    say(0.22, 1.0, f"trying {len(more)} starts close to the best")
+    points, costs = points + more, costs + costs_of(more)
     for x, cost in zip(points, costs, strict=True):
         history.append({"round": "start", "cost": number(cost)} | plain(wanted, x))
     if not np.isfinite(costs).any():

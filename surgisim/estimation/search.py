@@ -1,5 +1,6 @@
 """The few numbers a fit searches, and their way into a simulation."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +16,12 @@ PRIOR_LOG = 1.5
 """Standard deviation of the prior on a logarithm: tissue moduli spread over a factor 4-5 either way."""
 REACH = 2.0
 """How many prior deviations from its start a logarithm may go."""
-FIRST_STEPS, SECOND_STEPS = tuple(0.4 * k for k in range(-6, 3)), (0.0, 1.0, 2.0)
+FIRST_STEPS, SECOND_STEPS = tuple(0.4 * k for k in range(-6, 3)), (0.5, 1.2, 1.9)
 """Offsets of the first logarithm in the scan that precedes the descent, and of how the second then lies to it: two
 periods of a ring-down are told from those of one a fifth faster, so wider steps would pass between."""
-CLOSER_STEPS = (-0.2, 0.2)
-"""Offsets of both, about the best of those."""
-OPENING_STEPS = (-0.5, 0.5)
+CLOSER_STEPS = ((-0.2, 0.0), (0.2, 0.0), (0.0, -0.35), (0.0, 0.35))
+"""Offsets of both, and of how the second then lies to the first, about the best of those."""
+OPENING_STEPS = (-0.5, 0.0)
 """The same of the moments of release [frames]."""
 PRIOR_SHARE = 0.3
 """The same for a plain parameter, as a share of its range."""
@@ -74,17 +75,22 @@ class Search:
         return np.maximum(low, self.start - reach), np.minimum(high, self.start + reach)
 
     def starts(self, begin: np.ndarray) -> list[np.ndarray]:
-        """Points to try first: `begin` with its first two logarithms stepped, the second along with the first."""
+        """Points to try first: `begin` with its first two logarithms stepped, and with them the moments of release.
+
+        Soft tissue let go early and stiff tissue let go late are two valleys, and no descent crosses between.
+        """
         first, second, *_ = [*self._logarithms(), None, None]
-        points = []
-        for step in FIRST_STEPS if first is not None else (0.0,):
-            for beside in SECOND_STEPS if second is not None else (0.0,):
-                points.append(self._stepped(begin, step, beside))
-        return points
+        opens = np.array([name.endswith(".release") for name in self.names])
+        steps = itertools.product(
+            FIRST_STEPS if first is not None else (0.0,),
+            SECOND_STEPS if second is not None else (0.0,),
+            OPENING_STEPS if opens.any() else (0.0,),
+        )
+        return [self._stepped(begin + opening * opens, step, beside) for step, beside, opening in steps]
 
     def closer(self, begin: np.ndarray) -> list[np.ndarray]:
         """Points about one of those."""
-        return [self._stepped(begin, step, 0.0) for step in CLOSER_STEPS] if self._logarithms() else []
+        return [self._stepped(begin, *steps) for steps in CLOSER_STEPS] if self._logarithms() else []
 
     def _logarithms(self) -> list[int]:
         return [k for k, (*_, p) in enumerate(self.free) if p.logarithmic][:2]
@@ -94,14 +100,6 @@ class Search:
         for k, by in zip(self._logarithms(), (step, step + beside), strict=False):
             point[k] += by
         return np.clip(point, *self.bounds)
-
-    def openings(self, begin: np.ndarray) -> list[np.ndarray]:
-        """`begin` with the moments of release stepped; none where nothing is let go.
-
-        Soft tissue let go early and stiff tissue let go late are two valleys, and no descent crosses between.
-        """
-        opens = np.array([name.endswith(".release") for name in self.names])
-        return [np.clip(begin + o * opens, *self.bounds) for o in OPENING_STEPS] if opens.any() else []
 
     def values(self, x: np.ndarray) -> Values:
         """Law -> parameter -> value at x."""

@@ -17,7 +17,7 @@ from surgisim.perception.grasp.jaw_tissue import just_hidden, leading
 
 ALIKE = 0.15
 """Largest difference of displacement within the held ball, as a share of it."""
-REACH, SMALL = 0.06, 0.015
+REACH, SMALL = 0.1, 0.015
 """Largest and least radius of what jaws hold, as a share of the longer image side."""
 BEHIND = 0.02
 """How far behind the tip tissue is held, as a share of the longer image side."""
