@@ -26,7 +26,17 @@ from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.lay import Laying, upright
 from surgisim.estimation.model_error import model_error
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
-from surgisim.estimation.otherwise import Answer, Otherwise, answers, better, otherwise, resolution, rivals, shares
+from surgisim.estimation.otherwise import (
+    Answer,
+    Otherwise,
+    answers,
+    better,
+    decay,
+    otherwise,
+    resolution,
+    rivals,
+    shares,
+)
 from surgisim.estimation.picture import picture_loss
 from surgisim.estimation.refine import Refined, refine
 from surgisim.estimation.rounds import (
@@ -262,7 +272,15 @@ def _weighed(
         history.append({"round": "otherwise", "about": a.one.about, "share": share, "misfit": number(a.cost)})
     shifts = {a.one.about: (a.x - solution.x, share) for a, share in table}
     model = {about: share * np.outer(d, d) for about, (d, share) in shifts.items()}
-    return trial, solution, model | {"particles": resolution(trial, solution.x)}
+    return (
+        trial,
+        solution,
+        model
+        | {
+            "particles": resolution(trial, solution.x),
+            "decay on the grid": decay(trial, solution.x),
+        },
+    )
 
 
 def _part(progress: Say, begin: float, end: float) -> Say:

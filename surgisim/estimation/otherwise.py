@@ -44,6 +44,9 @@ MOST_ODDS = 20.0
 """Largest logarithm of how many times more probable a rival can be."""
 RESOLVED = 0.25
 """Standard deviation of where a grip's skin lies between particles, in their widths."""
+DECAY = 0.42
+"""Over the squared number of cells through the tissue, what a viscous body's decay is off by on a grid: a bent rod's by
+.104, .047 and .026 with 2, 3 and 4 cells (docs/verification.md, "Decay of a viscous rod")."""
 STEPS, ENOUGH = 4, 0.01
 """Most steps to where a fit lies otherwise, and the share of its cost that one must win for another."""
 AS_IT_IS = "nothing"
@@ -111,6 +114,13 @@ def otherwise(trial: Trial, camera: Camera, points: np.ndarray, make: Make) -> I
     coarse = replace(laying, columns=coarse, margin=0.0, kept={})
     yield Otherwise("grid", replace(trial, laying=coarse), size=TO_NOTHING)
     yield from _laws(trial, make)
+
+
+def decay(trial: Trial, x: np.ndarray) -> np.ndarray:
+    """Covariance of what the grid leaves open of a viscosity, in search space, (M, M): see DECAY."""
+    cells = trial.depth(x) / trial.stand(x)[0].bodies[0].body.spacing
+    off = DECAY / cells**2
+    return np.diag([off**2 if name.endswith(".eta") else 0.0 for name in trial.wanted.names])
 
 
 def resolution(trial: Trial, x: np.ndarray) -> np.ndarray:
