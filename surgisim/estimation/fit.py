@@ -311,8 +311,8 @@ def _nothing_to_learn(motion: Motion, tracks: Tracks, body: Body) -> str:
     if not len(motion.radius):
         return (
             "No instrument was found that holds tissue: nothing drives the body, so its physics cannot be learned from "
-            "this clip. If one does, say where: --grasp X,Y,RADIUS,START,END, in the recording's pixels and seconds; the "
-            "tracking stage's log has the likeliest."
+            "this clip. If one does, say where: --grasp X,Y,RADIUS,START,END, in the recording's pixels and seconds; "
+            "tracking's log has the likeliest."
         )
     if np.linalg.norm(motion.position - motion.position[:, :1], axis=-1).max() < 0.05 * body.spacing:
         return "The grip hardly moves: there is no motion to learn the physics from."
