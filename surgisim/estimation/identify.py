@@ -92,7 +92,9 @@ def regional(J: np.ndarray, r: np.ndarray, share: float, spread: np.ndarray, reg
     count = len(np.unique(region))
     value, vector = np.linalg.eigh(share * (J.T @ J) + np.diag(1 / spread**2))
     root = vector / np.sqrt(value)
-    among, turn = np.linalg.eigh(count / max(count - 1, 1) * (pulls @ root).T @ (pulls @ root))
+    # What a region asks for, the fit has already followed in part: as many numbers as there are.
+    left = count / max(count - J.shape[1], 1)
+    among, turn = np.linalg.eigh(left * (pulls @ root).T @ (pulls @ root))
     wide = root @ turn
     return (wide * np.maximum(among, 1.0)) @ wide.T
 

@@ -24,7 +24,7 @@ from surgisim.physics.catalogue import choose
 WORKERS = 2
 SAFETY = 0.9
 """Share of the largest stable step that is used."""
-REGIONS = 12
+REGIONS = 20
 """Parts of the tissue whose errors are taken to be independent of one another's."""
 
 
