@@ -20,6 +20,8 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from surgisim.artifacts.masks import Masks
+from surgisim.estimation.whiten import inverse_root
+from surgisim.lighting.headlight import facing
 from surgisim.mpm.simulator import Simulator
 from surgisim.perception.depth.near_light import linear_light
 from surgisim.perception.tracking.between import sample
@@ -51,15 +53,12 @@ GRAZING = 0.05
 def headlight(rest: np.ndarray, normal: np.ndarray, moved: np.ndarray, turned: np.ndarray) -> tuple[np.ndarray, ...]:
     """Change of log brightness by turning, log cos(theta), and by coming nearer, -2 log d, (...) each.
 
-    rest, moved: surface points, camera frame [m], (..., 3); normal, turned: their normals, of any length, (..., 3).
+    rest, moved: surface points, camera frame [m], (..., 3); normal, turned: their normals out of the tissue, of any
+    length, (..., 3).
     """
-
-    def facing(at: np.ndarray, n: np.ndarray) -> np.ndarray:
-        lengths = np.linalg.norm(at, axis=-1) * np.linalg.norm(n, axis=-1)
-        return np.log(np.maximum(np.abs((at * n).sum(-1)) / lengths, GRAZING))
-
+    before, after = (np.log(np.maximum(facing(at, n), GRAZING)) for at, n in ((rest, normal), (moved, turned)))
     nearer = 2 * (np.log(np.linalg.norm(rest, axis=-1)) - np.log(np.linalg.norm(moved, axis=-1)))
-    return facing(moved, turned) - facing(rest, normal), nearer
+    return after - before, nearer
 
 
 @dataclass(frozen=True)
@@ -113,8 +112,8 @@ class Brightness:
         slopes = np.stack([moved[:, 1] - moved[:, 2], moved[:, 3] - moved[:, 4]], 1) / (2 * self.step)
 
         def of(tangents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            turned = np.cross(tangents[:, 0, None] + slopes[:, 0], tangents[:, 1, None] + slopes[:, 1])
-            return headlight(self.rest[:, None], np.cross(tangents[:, 0], tangents[:, 1])[:, None], at, turned)
+            turned = np.cross(tangents[:, 1, None] + slopes[:, 1], tangents[:, 0, None] + slopes[:, 0])
+            return headlight(self.rest[:, None], np.cross(tangents[:, 1], tangents[:, 0])[:, None], at, turned)
 
         turning, nearer = of(self.tangents)
         leant = []
@@ -140,10 +139,8 @@ def _whitened(r: np.ndarray, columns: np.ndarray, modes: np.ndarray, size: np.nd
             [beside.T, (modes * (size**2).sum(1)[:, None]).T @ modes],
         ]
     )
-    value, vector = np.linalg.eigh(gram)
-    value = np.maximum(value, 1e-12)
     told = np.concatenate([np.einsum("kfc,kf->c", columns, r), modes.T @ (size * r).sum(1)])
-    taken = (vector * ((1 - 1 / np.sqrt(1 + value)) / value)) @ (vector.T @ told)
+    taken = inverse_root(gram) @ told
     count = columns.shape[-1]
     return r - columns @ taken[:count] - size * (modes @ taken[count:])[:, None]
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from surgisim.estimation.observation import Observation
+from surgisim.estimation.whiten import inverse_root
 
 SHARE = 0.15
 """Spread of the field, as a share of the local displacement."""
@@ -54,9 +55,7 @@ class ModelError:
             inner = []
             for c in range(size.shape[-1]):
                 gram = (self.modes * (size[..., c] ** 2).sum(1)[:, None]).T @ self.modes
-                value, vector = np.linalg.eigh(gram)
-                value = np.maximum(value, 1e-12)
-                inner.append((vector * ((1 - 1 / np.sqrt(1 + value)) / value)) @ vector.T)
+                inner.append(inverse_root(gram))
             self.kept[key] = size, inner
         return self.kept[key]
 

@@ -32,6 +32,9 @@ class Observation:
     carry: sparse.csr_matrix
     """Active nodes to points, (K, A)."""
 
+    light = None
+    """Points in space have no brightness; a film's have."""
+
     def carried_by(self, simulator: Simulator) -> Self:
         """The same points on another grid."""
         return replace(self, carry=simulator.carry(self.rest).tocsr())

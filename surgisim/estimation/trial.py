@@ -109,14 +109,14 @@ class Trial:
 
     def of_frames(self, each: np.ndarray) -> np.ndarray:
         """What each residual's frame has of `each`, (T,), in the order of `residual`, (R,)."""
-        count, light = len(self.observation.rest), getattr(self.observation, "light", None)
+        count, light = len(self.observation.rest), self.observation.light
         tracks = np.broadcast_to(each[self.fitted][None, :, None], (count, len(self.fitted), 3)).ravel()
         return np.concatenate([tracks, np.tile(each[self.fitted], len(light.rest))]) if light else tracks
 
     @cached_property
     def regions(self) -> np.ndarray:
         """Which errors may go together: the part of the tissue of every residual, in their order, (R,) int."""
-        rest, light = self.observation.rest, getattr(self.observation, "light", None)
+        rest, light = self.observation.rest, self.observation.light
         middles, of = kmeans2(rest, min(REGIONS, len(rest)), minit="++", seed=0)
         tracks = np.repeat(of, 3 * len(self.fitted))
         if light is None:
@@ -128,7 +128,7 @@ class Trial:
         frames = self.fitted[self.fitted <= last]
         r = observation.residual(run.u, frames)
         r = (self.error.whiten(r, frames) if self.error else r).ravel()
-        light = getattr(observation, "light", None)
+        light = observation.light
         return np.concatenate([r, light.residual(run.u, frames).ravel()]) if light else r
 
     def _run(self, x: np.ndarray, worker: int, last: int | None) -> tuple[Run, Observation]:

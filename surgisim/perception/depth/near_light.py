@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 
 from surgisim.artifacts.camera import Camera
+from surgisim.lighting.headlight import to_linear
 from surgisim.perception.depth.leaning import follow_leaning
 from surgisim.perception.depth.shading import Lattice, explain, shading
 from surgisim.perception.tracking.spread import spread
@@ -123,7 +124,7 @@ def _look(lattice, warp, now, alone, rest, albedo, origin, scale, focal) -> tupl
 def linear_light(rgb: np.ndarray) -> np.ndarray:
     """sRGB uint8 as linear light, 0-1, float32."""
     level = np.arange(256, dtype=np.float32) / 255
-    return np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4).astype(np.float32)[rgb]
+    return to_linear(level).astype(np.float32)[rgb]
 
 
 def _read(rgb: np.ndarray, covered: np.ndarray, shape: tuple[int, int]):
