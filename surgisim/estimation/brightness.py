@@ -14,38 +14,20 @@ is linear to first order and is integrated out, as the error of the simulation i
 from dataclasses import dataclass, replace
 from typing import Self
 
-import cv2
 import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from surgisim.artifacts.masks import Masks
 from surgisim.estimation.whiten import inverse_root
 from surgisim.lighting.headlight import facing
 from surgisim.mpm.simulator import Simulator
-from surgisim.perception.depth.near_light import linear_light
-from surgisim.perception.tracking.between import sample
-from surgisim.perception.tracking.flow_chain import widen
 
 MATTE, MATTE_SPREAD = 0.7, 0.25
 """How far brightness follows the angle, against a wholly matte surface without other light, and its spread."""
 LEANING = 0.15
 """Spread of the slope of the whole surface at rest, each way, where its depth is guessed."""
-SHAPE, FLOOR = 0.3, 0.02
-"""Spread of the simulation's own error, as a share of the change nearby, and its least value."""
-NOISE = 0.03
-"""Least spread of log brightness along a point's way, highlights' skirts included."""
-BLUR = 0.01
-"""Over how far light is averaged, as a share of the longer image side."""
-MARGIN = 0.012
-"""How far around an instrument light is not believed, as a share of the longer image side."""
-STILL, MOVING, ENOUGH = 0.05, 0.1, 10
-"""Shares of the farthest way below which a point stands still, and above which it moves; how many of either there must
-be."""
 AROUND = 12
 """Neighbours that a point's surface at rest is fitted to."""
-REACH = 0.3
-"""Length scale of the simulation's error, as a share of how far the motion spreads."""
 GRAZING = 0.05
 """Least cosine: a surface seen edge-on is lit by what is around it."""
 
@@ -86,11 +68,11 @@ class Brightness:
 
     def carried_by(self, simulator: Simulator) -> Self:
         """The same points on another grid."""
-        return replace(self, carry=_carry(simulator, self.rest, self.tangents, self.step))
+        return replace(self, carry=carry_of(simulator, self.rest, self.tangents, self.step))
 
     def placed(self, rest: np.ndarray) -> Self:
         """The same points where they lie otherwise, (K, 3) [m]."""
-        return replace(self, rest=rest, tangents=_tangents(rest))
+        return replace(self, rest=rest, tangents=tangents_of(rest))
 
     def residual(self, u: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Weighted difference, simulated minus seen, of what is left to tell at `frames`, (K, len(frames)).
@@ -145,82 +127,7 @@ def _whitened(r: np.ndarray, columns: np.ndarray, modes: np.ndarray, size: np.nd
     return r - columns @ taken[:count] - size * (modes @ taken[count:])[:, None]
 
 
-def brightness(
-    rgb: np.ndarray,
-    spoilt: np.ndarray,
-    rest: np.ndarray,
-    xy: np.ndarray,
-    visible: np.ndarray,
-    course: np.ndarray,
-    simulator: Simulator,
-    *,
-    step: float,
-    independent: float,
-) -> Brightness | None:
-    """The light of tracked points; None where too few of them move, or stand still, in sight.
-
-    rgb: sRGB, (T, H, W, 3) uint8. spoilt: instrument, its surroundings and highlights, (T, H, W) bool. rest: the
-    points in frame 0, camera frame [m], (K, 3). xy: where they are seen [px], (K, T, 2), visible: whether, (K, T) bool;
-    a frame in which none is visible is left aside.
-    course: share of the pull in every frame, (T,). step: over how far a surface's turning is taken [m].
-    """
-    light, clear = _read(rgb, spoilt, xy)
-    known = visible & clear & visible[:, :1] & clear[:, :1]
-    change = np.where(known, light - light[:, :1], 0.0)
-    far = np.linalg.norm(np.where(visible[..., None], xy - xy[:, :1], 0.0), axis=-1)
-    still = known & (far < STILL * np.percentile(far.max(1), 99))
-    moving = (far * known).max(1) > MOVING * np.percentile(far.max(1), 99)
-    used = visible.any(0)
-    if still[:, used].sum(0).min() < ENOUGH or moving.sum() < ENOUGH:
-        return None
-    # Exposure and lamp: what still tissue does in a frame is no motion.
-    gain = np.array([np.median(change[still[:, t], t]) if used[t] else 0.0 for t in range(len(used))])
-    change = np.where(known, change - gain, 0.0)
-    noise = np.hypot(NOISE, 1.4826 * np.median(np.abs(change[still])))
-    tangents = _tangents(rest)[moving]
-    rest, far, known, change = rest[moving], far[moving].max(1), known[moving], change[moving]
-    modes = _modes(rest, far, course, change, known)
-    carry = _carry(simulator, rest, tangents, step)
-    supported = (np.abs(simulator.support(carry).reshape(len(rest), 5) - 1) < 0.05).all(1)
-    weight = np.where(known & supported[:, None], 1 / noise, 0.0)
-    return Brightness(rest, tangents, change, weight, modes, course, step, independent, carry)
-
-
-def spoilt(masks: Masks) -> np.ndarray:
-    """Pixels whose light is not the tissue's own: instrument and highlights with what they touch, (T, H, W) bool."""
-    by = max(round(MARGIN * max(masks.tool.shape[1:])), 1)
-    return np.stack([widen(t, by) | widen(s, 1) for t, s in zip(masks.tool, masks.specular, strict=True)])
-
-
-def _read(rgb: np.ndarray, spoilt: np.ndarray, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Log of the linear light around points and whether nothing spoils it, (K, T) each."""
-    width = max(BLUR * max(rgb.shape[1:3]), 0.7)
-    light, clear = np.empty(xy.shape[:2]), np.empty(xy.shape[:2], bool)
-    for t, frame in enumerate(rgb):
-        usable = (~spoilt[t] & (frame.max(-1) < 250) & (frame.max(-1) > 8)).astype(np.float32)
-        share = cv2.GaussianBlur(usable, (0, 0), width)
-        mean = cv2.GaussianBlur(linear_light(frame).mean(-1) * usable, (0, 0), width) / np.maximum(share, 1e-3)
-        at = xy[:, t, None].astype(np.float32)
-        light[:, t] = np.log(np.maximum(sample(mean, at)[:, 0], 1e-4))
-        clear[:, t] = sample(share, at)[:, 0] > 0.8
-    return light, clear
-
-
-def _modes(rest: np.ndarray, far: np.ndarray, course: np.ndarray, change: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Smooth fields that the error of the simulated shape may make, times their spread at a full pull, (K, Q)."""
-    along = known * np.abs(course)
-    size = np.sqrt((along * change**2).sum(1) / np.maximum(along.sum(1), 1e-9)) / max(np.abs(course).max(), 1e-9)
-    middle = np.average(rest, axis=0, weights=far**2)
-    reach = REACH * np.sqrt(np.average(((rest - middle) ** 2).sum(1), weights=far**2))
-    apart = np.linalg.norm(rest[:, None] - rest[None], axis=-1)
-    likeness = np.exp(-0.5 * (apart / reach) ** 2)
-    around = np.sqrt((likeness @ (size**2 * known.any(1))) / np.maximum(likeness @ known.any(1), 1e-9))
-    value, vector = np.linalg.eigh(likeness)
-    chosen = value > 1e-2 * value[-1]
-    return np.maximum(SHAPE * around, FLOOR)[:, None] * vector[:, chosen] * np.sqrt(value[chosen])
-
-
-def _tangents(rest: np.ndarray) -> np.ndarray:
+def tangents_of(rest: np.ndarray) -> np.ndarray:
     """Along the surface at each point, across the view and down it, (K, 2, 3), from a plane through its neighbours."""
     near = cKDTree(rest).query(rest, min(AROUND, len(rest)))[1]
     around = rest[near]
@@ -232,7 +139,7 @@ def _tangents(rest: np.ndarray) -> np.ndarray:
     return np.stack([right, down], 1)
 
 
-def _carry(simulator: Simulator, rest: np.ndarray, tangents: np.ndarray, step: float) -> sparse.csr_matrix:
+def carry_of(simulator: Simulator, rest: np.ndarray, tangents: np.ndarray, step: float) -> sparse.csr_matrix:
     sides = [np.zeros_like(rest)]
     for axis in range(2):
         sides += [step * tangents[:, axis], -step * tangents[:, axis]]

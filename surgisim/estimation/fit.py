@@ -18,12 +18,12 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
-from surgisim.estimation.brightness import brightness, spoilt
 from surgisim.estimation.carrying import carrying, course
 from surgisim.estimation.damping import numerical_damping
 from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.lay import Laying, upright
+from surgisim.estimation.light_along_tracks import brightness, spoilt
 from surgisim.estimation.model_error import model_error
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
 from surgisim.estimation.otherwise import (

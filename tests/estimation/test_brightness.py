@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from slab import pulled, slab
 
-from surgisim.estimation.brightness import MATTE, Brightness, _carry, _tangents, _whitened, brightness, headlight
+from surgisim.estimation.brightness import MATTE, Brightness, _whitened, carry_of, headlight, tangents_of
+from surgisim.estimation.light_along_tracks import brightness
 from surgisim.mpm.setup import prepare
 
 LAWS = {"corotated": {"E": 900.0, "nu": 0.4}, "newtonian": {"eta": 1.0}}
@@ -28,10 +29,10 @@ def moved(by):
 
 def of(simulator, rest, seen=None):
     k = len(rest)
-    tangents = _tangents(rest)
+    tangents = tangents_of(rest)
     return Brightness(
         rest, tangents, np.zeros((k, T)) if seen is None else seen, np.full((k, T), 1 / 0.03), np.zeros((k, 1)), COURSE,
-        0.003, 0.02, _carry(simulator, rest, tangents, 0.003),
+        0.003, 0.02, carry_of(simulator, rest, tangents, 0.003),
     )  # fmt: skip
 
 
