@@ -9,7 +9,9 @@ from surgisim.artifacts.base import JsonArtifact, check
 @dataclass(frozen=True)
 class Physics(JsonArtifact):
     terms: dict[str, dict[str, dict[str, Any]]]
-    """Law -> parameter -> {"value", "unit"} and, where known, "low", "high", "identifiable"."""
+    """Law -> parameter -> {"value", "unit"}, the number that moves as recorded on this grid; and where the clip was
+    asked "tissue", its own number, which is that without what a grid gets wrong, with its "low", "high", and
+    "identifiable"."""
     density: float
     """[kg/m^3]"""
     gravity: list[float]

@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
-from surgisim.estimation.unknown import Unknown
+from surgisim.estimation.unknown import RELAID, Unknown
 
 TOWARD, TOWARD_MEASURED = 0.08, 0.01
 """Spread of how far a grip comes nearer, as a share of its distance: a pull of some 5 to 10 mm at 50 to 100 mm, and
@@ -82,7 +82,7 @@ def carrying(motion: Motion, tracks: Tracks, camera: Camera, measured: bool) -> 
             Unknown(named(j, "right"), 0.0, beside, -3 * beside, 3 * beside, "m", size=float(center[2])),
             Unknown(named(j, "down"), 0.0, beside, -3 * beside, 3 * beside, "m", size=float(center[2])),
             Unknown(named(j, "across"), 0.0, ACROSS, -4 * ACROSS, 4 * ACROSS, "1", True),
-            Unknown(named(j, "radius"), 0.0, RADIUS, -3 * RADIUS, 2 * RADIUS, "m", True, float(motion.radius[j])),
+            Unknown(named(j, "radius"), 0.0, RADIUS, -3 * RADIUS, 2 * RADIUS, "m", True, float(motion.radius[j]), RELAID),
         ]
         if not motion.active[j, -1]:
             unknowns.append(Unknown(named(j, "release"), RELEASE, RELEASE_SPREAD, *RELEASE_ENDS, "frames"))

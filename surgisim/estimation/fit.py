@@ -27,11 +27,13 @@ from surgisim.estimation.light_along_tracks import brightness, spoilt
 from surgisim.estimation.model_error import model_error
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
 from surgisim.estimation.otherwise import (
+    GRID,
     Answer,
     Otherwise,
     answers,
     better,
     decay,
+    on_no_grid,
     otherwise,
     resolution,
     rivals,
@@ -149,14 +151,15 @@ def estimate(
         x = choose_start(trial, x, history, progress)
         ends = windows(fitted, phase, settings.first_window)
         trial, solution = descend(trial, x, ends, settings, history, progress)
-        model = {}
+        model, gridless = {}, np.zeros(len(x))
         if trial.laying:
             ask = partial(otherwise, camera=camera, points=carried, make=make)
-            trial, solution, model = _weighed(trial, solution, ask, ends[-1:], settings, history, progress)
+            trial, solution, model, gridless = _weighed(trial, solution, ask, ends[-1:], settings, history, progress)
         x = solution.x
+        tissue = np.clip(x + gridless, *trial.wanted.bounds)
         table = identifiability(
-            solution, trial.wanted, phase_of=trial.of_frames(phase), phase_names=PHASES, density=settings.density,
-            length=trial.depth(x), independent=INDEPENDENT, region=trial.regions, model=model,
+            replace(solution, x=tissue), trial.wanted, phase_of=trial.of_frames(phase), phase_names=PHASES, density=settings.density,
+            length=trial.depth(tissue), independent=INDEPENDENT, region=trial.regions, model=model,
         )  # fmt: skip
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
     support = Support(trial.depth(x), *edge)
@@ -249,10 +252,11 @@ def _weighed(
     settings: Estimation,
     history: list,
     progress: Say,
-) -> tuple[Trial, Solution, dict[str, np.ndarray]]:
+) -> tuple[Trial, Solution, dict[str, np.ndarray], np.ndarray]:
     """The fit held against its rivals, going on from a far more probable one, and against what it takes for granted.
 
-    The last of it is the covariance that each adds to the numbers in search space, by its name.
+    With it the covariance that each adds to the numbers in search space, by its name, and how far the tissue's own
+    numbers lie from those that fit on this grid, (M,).
     """
     first, wanted = trial, trial.wanted
     found = answers(solution, wanted, list(rivals(trial, solution.x)), _part(progress, 0.55, 0.63))
@@ -271,16 +275,14 @@ def _weighed(
     for a, share in table:
         history.append({"round": "otherwise", "about": a.one.about, "share": share, "misfit": number(a.cost)})
     shifts = {a.one.about: (a.x - solution.x, share) for a, share in table}
+    gridless, doubt = on_no_grid(wanted, here, others)
     model = {about: share * np.outer(d, d) for about, (d, share) in shifts.items()}
-    return (
-        trial,
-        solution,
-        model
-        | {
-            "particles": resolution(trial, solution.x),
-            "decay on the grid": decay(trial, solution.x),
-        },
-    )
+    model |= {
+        GRID: doubt,
+        "particles": resolution(trial, solution.x),
+        "decay on the grid": decay(trial, solution.x),
+    }
+    return trial, solution, model, gridless
 
 
 def _part(progress: Say, begin: float, end: float) -> Say:
@@ -363,7 +365,8 @@ def _physics(
             entry = {"value": values[law][name], "unit": p.unit}
             known = table.get(f"{law}.{name}")
             if known:
-                entry |= {"low": known["low"], "high": known["high"], "identifiable": known["told"]}
+                entry |= {"tissue": known["value"], "low": known["low"], "high": known["high"]}
+                entry["identifiable"] = known["told"]
             terms[law][name] = entry
     grid = {"spacing": prepared.simulator.grid.spacing, "step": step}
     return Physics(terms, settings.density, list(settings.gravity), grid, grip, settings.form, _told(prepared.places))

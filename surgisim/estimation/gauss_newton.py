@@ -8,10 +8,6 @@ import numpy as np
 from surgisim.estimation.trial import at_once
 from surgisim.mpm.simulator import Breakdown
 
-DIFFERENCE = 0.02
-"""Step of the forward differences in search space: well above float32 noise, well below curvature."""
-NARROW = 0.3
-"""The same, at most, as a share of a number's prior deviation."""
 RENEWED = 0.05
 """Share of the cost a step must win, or the derivative is taken anew."""
 WIDTH = 2.0
@@ -36,6 +32,7 @@ def gauss_newton(
     *,
     prior: np.ndarray,
     spread: np.ndarray,
+    differences: np.ndarray,
     bounds: tuple[np.ndarray, np.ndarray],
     share: float,
     iterations: int,
@@ -45,7 +42,7 @@ def gauss_newton(
 ) -> Solution:
     """Minimise share sum huber(r(x)) + sum ((x - prior) / spread)^2 by Levenberg-Marquardt.
 
-    share: part of the residuals that counts as independent.
+    share: part of the residuals that counts as independent. differences: steps of the derivative, (M,).
 
     residual(x, worker) may be called from `workers` threads at once, each with its own number; it
     returns None where x cannot be simulated, which only a trial step may meet. together(xs) gives the residuals of
@@ -59,10 +56,8 @@ def gauss_newton(
     def all_of(xs: list[np.ndarray]) -> list[np.ndarray | None]:
         return together(xs) if together else at_once(residual, xs, workers)
 
-    step = np.minimum(DIFFERENCE, NARROW * spread)
-
     def jacobian_at(x: np.ndarray, r: np.ndarray) -> np.ndarray:
-        side = np.where(x + step <= high, 1.0, -1.0) * step
+        side = np.where(x + differences <= high, 1.0, -1.0) * differences
         shifted = all_of([x + side[m] * np.eye(len(x))[m] for m in range(len(x))])
         for m in [m for m, s in enumerate(shifted) if s is None]:
             side[m] = -side[m]

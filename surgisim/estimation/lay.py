@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import cKDTree
 
 from surgisim.artifacts.body import Body
@@ -51,10 +52,12 @@ class Columns:
     """Height of a layer of particles [m]."""
     thickness: float
     """How much tissue was laid below the surface, at the median column [m]."""
+    flat: bool = False
+    """Whether what holds it is flat, as deep below the surface's own plane, instead of following hills and hollows."""
 
     def laid(self, depth: float, *, rim: bool) -> Body:
         """The body whose tissue is held from `depth` [m] below the surface on, and at its rim or not."""
-        end = self.above + depth
+        end = (self._plane if self.flat else self.above) + depth
         free = np.maximum(np.rint((end - self.begin) / self.layer), 0).astype(int)
         held = max(1, round(BELOW * self.spacing / self.layer))
         kept = free > 0
@@ -77,6 +80,13 @@ class Columns:
             held=under | (rim & self.rim[owner]),
             spacing=self.spacing,
         )
+
+
+    @property
+    def _plane(self) -> np.ndarray:
+        """Depth of the plane that lies nearest the surface, at every column [m], (N,)."""
+        across = np.column_stack([self.xy, np.ones(len(self.xy))])
+        return across @ np.linalg.lstsq(across, self.above, rcond=None)[0]
 
 
 def beyond(columns: Columns, margin: float) -> Columns:
@@ -108,6 +118,34 @@ def beyond(columns: Columns, margin: float) -> Columns:
         color=np.concatenate([columns.color, columns.color[near[:, 0]]]),
         seen=np.concatenate([columns.seen, np.zeros(count, bool)]),
         rim=np.concatenate([np.zeros(len(columns.rim), bool), edge]),
+    )
+
+
+def finer(columns: Columns, times: float) -> Columns:
+    """The same tissue in columns and layers that many times as fine, for a grid as much finer."""
+    width = np.sqrt(np.median(columns.area))
+    low, high = columns.xy.min(0), columns.xy.max(0)
+    counts = np.rint((np.rint((high - low) / width) + 1) * times).astype(int)
+    x, y = (low[a] - 0.5 * width + (high[a] - low[a] + width) * (np.arange(n) + 0.5) / n for a, n in enumerate(counts))
+    place = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
+    known = cKDTree(columns.xy)
+    # Every new column stands within the width of one of the old.
+    away, owner = known.query(place, p=np.inf)
+    place, owner = place[away < 0.501 * width], owner[away < 0.501 * width]
+    both = np.stack([columns.begin, columns.above], -1)
+    smooth = LinearNDInterpolator(columns.xy, both)(place)
+    begin, above = np.where(np.isfinite(smooth), smooth, both[owner]).T
+    return replace(
+        columns,
+        xy=place,
+        begin=begin,
+        above=np.minimum(above, begin),
+        area=np.full(len(place), columns.area.sum() / len(place)),
+        color=columns.color[owner],
+        seen=columns.seen[owner],
+        rim=columns.rim[owner],
+        spacing=columns.spacing / times,
+        layer=columns.layer / times,
     )
 
 

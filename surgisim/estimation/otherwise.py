@@ -19,6 +19,7 @@ import numpy as np
 from surgisim.artifacts.camera import Camera
 from surgisim.estimation.gauss_newton import WIDTH, Solution, misfit
 from surgisim.estimation.identify import spread_of
+from surgisim.estimation.lay import finer
 from surgisim.estimation.rounds import INDEPENDENT
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import EDGES
@@ -32,10 +33,14 @@ LENS = 0.3
 SLOPE, BEND = 0.15, 0.4
 """Spread of a surface's slope, each way, and of its bend, where its shape was guessed from one view: on ten clips of
 family 900 those of light alone are .02 to .27 and .02 to .44 off."""
-COARSER = 1.25
-"""Grid spacing that is tried, over the fit's own."""
-TO_NOTHING = 1 / (COARSER**2 - 1)
-"""How many times what a coarser grid changes, the fit's own grid is off: errors go with the square of its spacing."""
+FINER = 1.5
+"""The fit's grid spacing over that of a finer one."""
+TO_NOTHING, DOUBT = 1 / (1 - 1 / FINER), 1.0
+"""How many times what a finer grid changes, the fit's own grid is off, where errors go with its spacing, as those of a
+slab's periods do (docs/verification.md, "A pulled slab's periods"); standard deviation of that, which holds errors that
+go with its square."""
+EDGE = 0.2
+"""Standard deviation of how far tissue goes on beyond the picture, as a share of the depth that is expected."""
 FARTHER = (-1.6, -0.8, 0.8, 1.6)
 """Logarithms of how many times stiffer tissue is tried beside the one found."""
 BY_FAR = 2.0
@@ -49,8 +54,8 @@ DECAY = 0.42
 .104, .047 and .026 with 2, 3 and 4 cells (docs/verification.md, "Decay of a viscous rod")."""
 STEPS, ENOUGH = 4, 0.01
 """Most steps to where a fit lies otherwise, and the share of its cost that one must win for another."""
-AS_IT_IS = "nothing"
-"""What is changed where a fit is only brought to where these steps would bring it."""
+AS_IT_IS, GRID = "nothing", "grid"
+"""What is changed where a fit is only brought to where these steps would bring it, and where its grid is finer."""
 
 Say = Callable[[float, float, str], None]
 Make = Callable[..., Prepared]
@@ -67,8 +72,6 @@ class Otherwise:
     """Whether it competes with what was chosen by how well it fits."""
     told: bool = False
     """Whether it is one prior standard deviation of something whose size the clip may tell."""
-    size: float = 1.0
-    """How many times the answer counts where it is neither."""
     begin: np.ndarray | None = None
     """Where the fit begins, if not from the one that is asked about, (M,)."""
     open: np.ndarray | None = None
@@ -99,6 +102,9 @@ def rivals(trial: Trial, x: np.ndarray) -> Iterator[Otherwise]:
                 replace(trial, laying=laying.ending(margin, edge.rim)),
                 rival=True,
             )
+    flat = not laying.columns.flat
+    other = replace(laying, columns=replace(laying.columns, flat=flat), kept={})
+    yield Otherwise("flat base" if flat else "base that follows the surface", replace(trial, laying=other), rival=True)
     yield from _moduli(trial, x)
 
 
@@ -110,10 +116,25 @@ def otherwise(trial: Trial, camera: Camera, points: np.ndarray, make: Make) -> I
     yield Otherwise(AS_IT_IS, trial)
     yield from _views(trial, camera, points, make)
     laying = trial.laying
-    coarse = replace(laying.whole, spacing=COARSER * laying.columns.spacing)
-    coarse = replace(laying, columns=coarse, margin=0.0, kept={})
-    yield Otherwise("grid", replace(trial, laying=coarse), size=TO_NOTHING)
+    fine = replace(laying, columns=finer(laying.whole, FINER), margin=0.0, kept={})
+    yield Otherwise(GRID, replace(trial, laying=fine))
+    farther = laying.ending(laying.margin + EDGE * trial.wanted.depth.size, laying.rim)
+    yield Otherwise("edge", replace(trial, laying=farther), told=True)
     yield from _laws(trial, make)
+
+
+def on_no_grid(wanted: Search, here: Answer, found: list[Answer]) -> tuple[np.ndarray, np.ndarray]:
+    """How far the numbers lie from `here` without what a grid gets wrong, (M,), and the covariance of that, (M, M).
+
+    A grid makes periods long and vibration die late, and a fit makes tissue stiffer and more viscous for it: moduli and
+    viscosities are extrapolated to no spacing. What it does to the other numbers has no known sign and is only what they
+    may be off by.
+    Richardson, The deferred approach to the limit, Philosophical Transactions A 226, 1927.
+    """
+    change = sum((a.x - here.x for a in found if a.one.about == GRID), np.zeros(len(here.x)))
+    timed = np.array([name.endswith((".E", ".eta")) for name in wanted.names])
+    doubt = np.where(timed, DOUBT, TO_NOTHING) * change
+    return np.where(timed, TO_NOTHING * change, 0.0), np.outer(doubt, doubt)
 
 
 def decay(trial: Trial, x: np.ndarray) -> np.ndarray:
@@ -220,7 +241,7 @@ def shares(solution: Solution, wanted: Search, found: list[Answer]) -> list[floa
         if a.one.rival:
             result.append(float(odd / (1.0 + sum(odds))))
         elif a.residual is None or not a.one.told:
-            result.append(a.one.size**2)
+            result.append(1.0)
         else:
             result.append(_mean_square(weights, solution.residual, a.residual, scale))
     return result

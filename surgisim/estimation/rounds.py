@@ -130,7 +130,7 @@ def settle_pull(
     try:
         found = gauss_newton(
             lambda y, worker: trial.residual(whole(y), worker, last), x[slow], prior=wanted.start[slow],
-            spread=wanted.spread[slow], bounds=(low[slow], high[slow]), share=INDEPENDENT, iterations=PULLS,
+            spread=wanted.spread[slow], differences=wanted.differences[slow], bounds=(low[slow], high[slow]), share=INDEPENDENT, iterations=PULLS,
             workers=WORKERS, said=said, together=lambda ys: trial.together([whole(y) for y in ys], last),
         )  # fmt: skip
     except Breakdown as breakdown:
@@ -196,6 +196,7 @@ def descend(
                     x,
                     prior=wanted.start,
                     spread=wanted.spread,
+                    differences=wanted.differences,
                     bounds=wanted.bounds,
                     share=INDEPENDENT,
                     iterations=settings.iterations,

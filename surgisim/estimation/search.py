@@ -7,11 +7,13 @@ import numpy as np
 
 from surgisim.artifacts.motion import Motion
 from surgisim.estimation.carrying import Carrying
-from surgisim.estimation.unknown import Unknown
+from surgisim.estimation.unknown import DIFFERENCE, Unknown
 from surgisim.mpm.setup import Values
 from surgisim.physics.catalogue import Param, choose
 from surgisim.problem import Problem
 
+NARROW = 0.3
+"""Longest step of a difference, as a share of a number's prior deviation."""
 PRIOR_LOG = 1.5
 """Standard deviation of the prior on a logarithm: tissue moduli spread over a factor 4-5 either way."""
 REACH = 2.0
@@ -60,6 +62,12 @@ class Search:
         """Prior standard deviation of each component of x."""
         laws = [PRIOR_LOG if p.logarithmic else PRIOR_SHARE * (p.high - p.low) for *_, p in self.free]
         return np.array(laws + [u.spread for u in self.open])
+
+    @property
+    def differences(self) -> np.ndarray:
+        """Steps by which derivatives are taken, (M,)."""
+        steps = np.array([DIFFERENCE] * len(self.free) + [u.difference for u in self.open])
+        return np.minimum(steps, NARROW * self.spread)
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:

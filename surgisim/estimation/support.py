@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surgisim.estimation.lay import Columns
-from surgisim.estimation.unknown import Unknown
+from surgisim.estimation.unknown import RELAID, Unknown
 
 SHARES = (0.7, 0.45, 0.3)
 """Depths the fit may begin from, as shares of the thickened body's."""
@@ -50,4 +50,4 @@ def open_depth(columns: Columns) -> Unknown:
     """The depth at which tissue is held as a number of the fit."""
     middle = MIDDLE * columns.thickness
     low = min(np.log(LEAST * columns.spacing / middle), -SPREAD)
-    return Unknown("held.depth", 0.0, SPREAD, low, np.log(MOST / MIDDLE), "m", True, middle)
+    return Unknown("held.depth", 0.0, SPREAD, low, np.log(MOST / MIDDLE), "m", True, middle, RELAID)
