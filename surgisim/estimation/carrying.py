@@ -82,7 +82,7 @@ def carrying(motion: Motion, tracks: Tracks, camera: Camera, measured: bool) -> 
             Unknown(named(j, "right"), 0.0, beside, -3 * beside, 3 * beside, "m", size=float(center[2])),
             Unknown(named(j, "down"), 0.0, beside, -3 * beside, 3 * beside, "m", size=float(center[2])),
             Unknown(named(j, "across"), 0.0, ACROSS, -4 * ACROSS, 4 * ACROSS, "1", True),
-            Unknown(named(j, "radius"), 0.0, RADIUS, -3 * RADIUS, 2 * RADIUS, "m", True, float(motion.radius[j]), RELAID),
+            Unknown(named(j, "radius"), 0.0, RADIUS, -3 * RADIUS, 2 * RADIUS, "m", True, motion.radius[j], RELAID),
         ]
         if not motion.active[j, -1]:
             unknowns.append(Unknown(named(j, "release"), RELEASE, RELEASE_SPREAD, *RELEASE_ENDS, "frames"))

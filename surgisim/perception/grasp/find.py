@@ -11,7 +11,7 @@ import numpy as np
 
 from surgisim.perception.grasp.contact import distance
 from surgisim.perception.grasp.following import AROUND, Following, following, jaw_motion
-from surgisim.perception.grasp.holding import began, held, let_go
+from surgisim.perception.grasp.holding import began, held, let_go, recoiled
 from surgisim.perception.grasp.instruments import Instrument
 from surgisim.perception.grasp.jaw_tissue import just_hidden, leading
 
@@ -88,7 +88,7 @@ def _grip(
     near = np.argsort(np.linalg.norm(start - center, axis=-1))[:9]
     course = np.median(xy[near] - start[near][:, None], axis=0)
     begin = began(follows, first, side)
-    end = let_go(follows, last, frames)
+    end = recoiled(course, follows, begin, let_go(follows, last, frames))
     if end - begin < 3:
         return None
     far = np.linalg.norm(course - course[begin], axis=-1)[begin : end + 1]

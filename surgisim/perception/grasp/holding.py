@@ -10,6 +10,11 @@ PLAIN = 0.004
 """A way that tells as much as agreement on it can, as a share of the longer image side."""
 SOON = 8
 """Frames that jaws stand at tissue before they take it along."""
+AWAY, QUICK, FALL = 0.9, 5, 0.6
+"""Share of its way below which tissue is on its way back; frames in which what is let go springs back, and by how
+much of its way at least."""
+PARTLY = 0.5
+"""Share of that which jaws that hold it go along."""
 SWITCH = 2.5
 """Evidence it takes to believe that jaws have closed or opened."""
 
@@ -70,3 +75,20 @@ def let_go(follows: Following, last: int, frames: int) -> int:
         return last
     sudden = np.nan_to_num(part, nan=-1.0)
     return near.start + int(np.argmax(sudden > 0.5 * sudden.max()))
+
+
+def recoiled(course: np.ndarray, follows: Following, begin: int, end: int) -> int:
+    """The last frame before tissue springs back without the jaws; `end` where it does not.
+
+    course: where the tissue at the jaws is carried [px], (T, 2), held from `begin` to `end` as far as is known. Jaws
+    open slowly, and stand or draw back near the place where tissue has left them: that it goes back alone says when.
+    """
+    way = course - course[begin]
+    top = begin + int(np.linalg.norm(way[begin : end + 1], axis=-1).argmax())
+    share = way @ way[top] / max(way[top] @ way[top], 1e-9)
+    last = begin + int(np.flatnonzero(share[begin : end + 1] >= AWAY)[-1])
+    after = min(last + QUICK, len(course) - 1)
+    back = course[after] - course[last]
+    jaws = np.nansum(follows.jaws[last:after], axis=0)
+    alone = np.linalg.norm(back - jaws) > PARTLY * np.linalg.norm(back)
+    return last if alone and share[last] - share[after] > FALL else end
