@@ -158,8 +158,9 @@ def estimate(
         x = solution.x
         tissue = np.clip(x + gridless, *trial.wanted.bounds)
         table = identifiability(
-            replace(solution, x=tissue), trial.wanted, phase_of=trial.of_frames(phase), phase_names=PHASES, density=settings.density,
-            length=trial.depth(tissue), independent=INDEPENDENT, region=trial.regions, model=model,
+            replace(solution, x=tissue), trial.wanted, phase_of=trial.of_frames(phase), phase_names=PHASES,
+            density=settings.density, length=trial.depth(tissue), independent=INDEPENDENT, region=trial.regions,
+            model=model,
         )  # fmt: skip
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
     support = Support(trial.depth(x), *edge)
@@ -217,7 +218,8 @@ def _opened(
     if settings.carrying:
         measured = bool((trial.observation.weight[..., 2] > 0).any())
         wanted = replace(wanted, carrying=carrying(motion, tracks, camera, measured))
-    trial = replace(trial, error=model_error(trial.observation, course(tracks, motion), INDEPENDENT))
+    free = phases(motion, trial.frames) == PHASES.index("release")
+    trial = replace(trial, error=model_error(trial.observation, course(tracks, motion), free, INDEPENDENT))
     laid = upright(body, camera) if settings.support and settings.form == "total" else None
     if laid is None:
         return replace(trial, wanted=wanted)

@@ -1,10 +1,12 @@
 """What a simulation of a film gets wrong although its numbers are right, as an error that goes with the pull.
 
 The surface's shape, the rim and the grip are guesses, so that the simulated displacement is a smooth field off, in
-proportion to how far the tissue is carried: the same field in all frames of a pull. A fit that took its thousands of
-differences for independent would bend the tissue's numbers after it. Here the field is a Gaussian process and is
-integrated out (Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63, 2001), so that the shape of
-the motion tells as much as a few dozen numbers do, and the course in time, which the field does not bend, all it can.
+proportion to how far the tissue is carried: the same field in all frames of a pull, and another, which swings as the
+tissue does, once that is let go: how far it swings for a pull is a guess, how fast and how long is not. A fit that took
+its thousands of differences for independent would bend the tissue's numbers after it. Here each field is a Gaussian
+process and is integrated out (Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63, 2001), so that
+the shape of the motion tells as much as a few dozen numbers do, and the course in time, which a field does not bend,
+all it can.
 """
 
 from dataclasses import dataclass, field
@@ -31,7 +33,9 @@ class ModelError:
     modes: np.ndarray
     """Times their standard deviations, as shares of `size`, (K, Q)."""
     size: np.ndarray
-    """Displacement over the standard deviation of what is seen, (K, T, 3)."""
+    """Displacement, with the sign of its course, over the standard deviation of what is seen, (K, T, 3)."""
+    free: np.ndarray
+    """Frames in which no grip holds: they have a field of their own, (T,) bool."""
     independent: float
     """Share of the seen numbers that counts as independent."""
     kept: dict = field(default_factory=dict, compare=False)
@@ -41,15 +45,22 @@ class ModelError:
 
         With noise of variance 1 / independent beside the error's B B^T, this is (1 + independent B B^T)^(-1/2) r.
         """
-        size, inner = self._of(frames)
+        out = r.copy()
+        for k, mine in enumerate((~self.free[frames], self.free[frames])):
+            if mine.any():
+                out[:, mine] = self._whitened(r[:, mine], frames[mine], k)
+        return out
+
+    def _whitened(self, r: np.ndarray, frames: np.ndarray, field: int) -> np.ndarray:
+        size, inner = self._of(frames, field)
         out = r.copy()
         for c in range(r.shape[-1]):
             told = self.modes.T @ (size[..., c] * r[..., c]).sum(1)
             out[..., c] -= size[..., c] * (self.modes @ (inner[c] @ told))[:, None]
         return out
 
-    def _of(self, frames: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
-        key = frames.tobytes()
+    def _of(self, frames: np.ndarray, field: int) -> tuple[np.ndarray, list[np.ndarray]]:
+        key = field, frames.tobytes()
         if key not in self.kept:
             size = np.sqrt(self.independent) * self.size[:, frames]
             inner = []
@@ -60,8 +71,11 @@ class ModelError:
         return self.kept[key]
 
 
-def model_error(seen: Observation, course: np.ndarray, independent: float) -> ModelError:
-    """The error of a simulation that is compared with these points; course: share of the pull in every frame, (T,)."""
+def model_error(seen: Observation, course: np.ndarray, free: np.ndarray, independent: float) -> ModelError:
+    """The error of a simulation that is compared with these points.
+
+    course: share of the pull in every frame, (T,); free: whether no grip holds any more, (T,) bool.
+    """
     used = seen.weight > 0
     moved = np.linalg.norm(seen.displacement * used, axis=-1)
     at = int(np.argmax(np.where(used.any(-1).mean(0) > 0.5, course, -1.0)))
@@ -74,4 +88,4 @@ def model_error(seen: Observation, course: np.ndarray, independent: float) -> Mo
     value, vector = np.linalg.eigh(np.exp(-0.5 * (apart / reach) ** 2))
     chosen = value > LEAST * value[-1]
     modes = SHARE * vector[:, chosen] * np.sqrt(value[chosen])
-    return ModelError(modes, seen.weight * far[:, None, None] * np.abs(course)[None, :, None], independent)
+    return ModelError(modes, seen.weight * far[:, None, None] * course[None, :, None], free, independent)

@@ -126,9 +126,9 @@ def otherwise(trial: Trial, camera: Camera, points: np.ndarray, make: Make) -> I
 def on_no_grid(wanted: Search, here: Answer, found: list[Answer]) -> tuple[np.ndarray, np.ndarray]:
     """How far the numbers lie from `here` without what a grid gets wrong, (M,), and the covariance of that, (M, M).
 
-    A grid makes periods long and vibration die late, and a fit makes tissue stiffer and more viscous for it: moduli and
-    viscosities are extrapolated to no spacing. What it does to the other numbers has no known sign and is only what they
-    may be off by.
+    A grid makes periods long and vibration die late, and a fit makes tissue stiffer and more viscous for it: moduli
+    and viscosities are extrapolated to no spacing. What it does to the other numbers has no known sign and is only
+    what they may be off by.
     Richardson, The deferred approach to the limit, Philosophical Transactions A 226, 1927.
     """
     change = sum((a.x - here.x for a in found if a.one.about == GRID), np.zeros(len(here.x)))

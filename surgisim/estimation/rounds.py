@@ -130,8 +130,9 @@ def settle_pull(
     try:
         found = gauss_newton(
             lambda y, worker: trial.residual(whole(y), worker, last), x[slow], prior=wanted.start[slow],
-            spread=wanted.spread[slow], differences=wanted.differences[slow], bounds=(low[slow], high[slow]), share=INDEPENDENT, iterations=PULLS,
-            workers=WORKERS, said=said, together=lambda ys: trial.together([whole(y) for y in ys], last),
+            spread=wanted.spread[slow], differences=wanted.differences[slow], bounds=(low[slow], high[slow]),
+            share=INDEPENDENT, iterations=PULLS, workers=WORKERS, said=said,
+            together=lambda ys: trial.together([whole(y) for y in ys], last),
         )  # fmt: skip
     except Breakdown as breakdown:
         history.append({"round": "pull", "last_frame": last, "cost": None, "broke": str(breakdown)})

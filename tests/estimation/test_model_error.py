@@ -1,5 +1,7 @@
 """An error that goes with the pull is integrated out, and only that."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from surgisim.estimation.model_error import model_error
 from surgisim.estimation.observation import Observation
 
 FRAMES, INDEPENDENT = 12, 0.02
+HELD = np.zeros(FRAMES, bool)
 
 
 def seen(points=60, seed=3):
@@ -23,7 +26,7 @@ def seen(points=60, seed=3):
 
 def test_whitening_is_the_inverse_root_of_the_whole_covariance():
     observation, course = seen()
-    error, frames = model_error(observation, course, INDEPENDENT), np.arange(1, 10)
+    error, frames = model_error(observation, course, HELD, INDEPENDENT), np.arange(1, 10)
     r = np.random.default_rng(0).normal(size=(60, len(frames), 3)) * (observation.weight[:, frames] > 0)
     got = error.whiten(r, frames)
     for c in range(2):
@@ -36,7 +39,7 @@ def test_whitening_is_the_inverse_root_of_the_whole_covariance():
 
 def test_a_field_that_goes_with_the_pull_hardly_counts_and_one_that_does_not_counts_whole():
     observation, course = seen()
-    error, frames = model_error(observation, course, INDEPENDENT), np.arange(1, FRAMES)
+    error, frames = model_error(observation, course, HELD, INDEPENDENT), np.arange(1, FRAMES)
     field = 0.2 * (
         observation.displacement / np.maximum(np.linalg.norm(observation.displacement, axis=-1), 1e-12)[..., None]
     )
@@ -50,9 +53,27 @@ def test_a_field_that_goes_with_the_pull_hardly_counts_and_one_that_does_not_cou
 
 def test_windows_leave_out_what_they_do_not_see():
     observation, course = seen()
-    error = model_error(observation, course, INDEPENDENT)
+    error = model_error(observation, course, HELD, INDEPENDENT)
     r = np.random.default_rng(1).normal(size=(60, FRAMES - 1, 3)) * (observation.weight[:, 1:] > 0)
     short = error.whiten(r[:, :4], np.arange(1, 5))
     assert (short**2).sum() <= (r[:, :4] ** 2).sum()
     # The longer a window, the surer the field, and the more of it is taken out of the same frames.
     assert np.abs(error.whiten(r, np.arange(1, FRAMES))[:, :4] - short).max() > 0
+
+
+def test_what_is_let_go_has_a_field_of_its_own_that_swings_with_it():
+    observation, course = seen()
+    course[8:] = [-0.6, -0.2, 0.4, 0.1]
+    free = np.arange(FRAMES) >= 8
+    observation = replace(observation, weight=4 * observation.weight)
+    error, frames = model_error(observation, course, free, INDEPENDENT), np.arange(1, FRAMES)
+    far = np.linalg.norm(observation.displacement, axis=-1).max(1)[:, None, None] * np.array([1.0, 0.3, 0.0])
+    weight = observation.weight[:, frames]
+    swing = weight * 0.2 * far * (course * free)[None, frames, None]
+    # As far off as the error's spread while it swings hardly counts; the same that does not change its sign does.
+    assert (error.whiten(swing, frames) ** 2).sum() < 0.2 * (swing**2).sum()
+    assert (error.whiten(np.abs(swing), frames) ** 2).sum() > 0.5 * (swing**2).sum()
+    # Both fields are told apart: one of the pull takes nothing off the swing.
+    driven = weight * 0.2 * far * (course * ~free)[None, frames, None]
+    both = error.whiten(driven + swing, frames)
+    assert both[:, free[frames]] == pytest.approx(error.whiten(swing, frames)[:, free[frames]])

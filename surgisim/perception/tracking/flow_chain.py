@@ -64,7 +64,7 @@ def _place(patches: Templates, warp: Warp, grey: np.ndarray, bright: np.ndarray,
     inside = (xy >= 0).all(-1) & (xy[:, 0] <= width - 1) & (xy[:, 1] <= height - 1)
     covered = sample(hidden.astype(np.float32), xy[:, None])[:, 0] > 0.25
     visible = (known | (seen & (found.likeness > STRANGE))) & inside & ~covered
-    return xy, visible, np.where(known, np.maximum(found.sigma, 0.03), error)
+    return xy, visible, np.maximum(np.where(known, found.sigma, error), 0.03)
 
 
 def _grey(rgb: np.ndarray) -> np.ndarray:
