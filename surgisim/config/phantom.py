@@ -26,6 +26,8 @@ class Phantom(Settings):
     """Angle between the view and the tissue's normal [rad]."""
     relief: float = Field(1.6e-3, ge=0)
     """RMS height of the hills [m]."""
+    dome: float = Field(0.0, ge=0)
+    """How far the middle of the tissue rises above its corners [m]."""
     thickness: float = Field(0.016, gt=0)
     """Of the tissue above its held base [m]."""
     margin: float = Field(3e-3, ge=0)
@@ -60,6 +62,10 @@ class Phantom(Settings):
     """Surface points whose true paths are recorded [1]."""
     noise: float = Field(0.006, ge=0)
     """Sensor noise at white, linear light [1]."""
+    wet: float = Field(1.0, ge=0, le=3)
+    """How strongly its film of water glints [1]."""
+    smoke: float = Field(0.0, ge=0, le=0.8)
+    """Mean opacity of smoke before it [1]."""
     samples: int = Field(2, ge=1, le=8)
     """Rays per pixel along x and along y [1]."""
     crf: int = Field(12, ge=0, le=51)

@@ -27,7 +27,6 @@ from surgisim.estimation.light_along_tracks import brightness, spoilt
 from surgisim.estimation.model_error import model_error
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
 from surgisim.estimation.otherwise import (
-    GRID,
     Answer,
     Otherwise,
     answers,
@@ -277,10 +276,10 @@ def _weighed(
     for a, share in table:
         history.append({"round": "otherwise", "about": a.one.about, "share": share, "misfit": number(a.cost)})
     shifts = {a.one.about: (a.x - solution.x, share) for a, share in table}
-    gridless, doubt = on_no_grid(wanted, here, others)
+    gridless, doubt = on_no_grid(trial, solution.x)
     model = {about: share * np.outer(d, d) for about, (d, share) in shifts.items()}
     model |= {
-        GRID: doubt,
+        "periods on the grid": doubt,
         "particles": resolution(trial, solution.x),
         "decay on the grid": decay(trial, solution.x),
     }

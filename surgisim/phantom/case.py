@@ -76,4 +76,13 @@ def _shape(settings: Phantom, view: View, rng: np.random.Generator) -> Shape:
     waves = np.stack([np.cos(heading), np.sin(heading), np.zeros(count), height], 1)
     waves[:, :2] *= (2 * np.pi / length)[:, None]
     waves[:, 2] = rng.uniform(0, 2 * np.pi, count)
-    return Shape(center, axes, flat.min(0) - margin, flat.max(0) + margin, settings.thickness, waves)
+    low, high = flat.min(0) - margin, flat.max(0) + margin
+    if settings.dome:
+        waves = np.concatenate([waves, _dome(low, high, settings.dome)])
+    return Shape(center, axes, low, high, settings.thickness, waves)
+
+
+def _dome(low: np.ndarray, high: np.ndarray, height: float) -> np.ndarray:
+    """Half a wave across either side: `height` [m] in the middle, nothing at the corners; rows as Shape.waves'."""
+    (u, v), (mid_u, mid_v) = np.pi / (high - low), 0.5 * (low + high)
+    return np.array([[u, 0, -u * mid_u, 0.5 * height], [0, v, -v * mid_v, 0.5 * height]])

@@ -12,6 +12,7 @@ from surgisim.phantom.case import Case, generator, invent
 from surgisim.phantom.elements import elements
 from surgisim.phantom.march import Drive, march
 from surgisim.phantom.points import choose, follow
+from surgisim.phantom.smoke import smoke
 from surgisim.phantom.texture import paint
 from surgisim.phantom.view import look
 
@@ -40,6 +41,8 @@ def photograph(settings, case, block, times, positions, progress=None) -> tuple[
     """Ray-cast every frame, and record tool, depth and points."""
     view, s = case.view, settings.samples
     texture = paint(case.shape, generator(settings.seed, "texture"))
+    texture.layers[..., 5] *= settings.wet
+    through = smoke((view.height * s, view.width * s), settings.smoke, generator(settings.seed, "smoke"))
     rays, centres = view.rays(view.grid(s)), view.rays(view.grid(1)).reshape(-1, 3)
     sensor = generator(settings.seed, "sensor")
     frames = np.empty((len(times), view.height, view.width, 3), np.uint8)
@@ -54,6 +57,7 @@ def photograph(settings, case, block, times, positions, progress=None) -> tuple[
         light.reshape(-1, 3)[front] = shading.steel(
             rays.reshape(-1, 3)[front], z[front], normal[front], part[front], station[front], case.lamp
         )
+        light = through(light, times[t]) if settings.smoke else light
         frames[t] = shading.expose(light, s, case.lamp, settings.noise, sensor)
         depth[t] = look(view, positions[t], block.triangles, 1).z
         tool[t] = front.reshape(view.height, s, view.width, s).any((1, 3))

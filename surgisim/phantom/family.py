@@ -49,6 +49,8 @@ def draw(seed: int, n: int) -> dict[str, Any]:
         **_pull(_generator(seed, n, "pull"), FARTHEST * tissue["thickness"]),
         **times,
         **_picture(_generator(seed, n, "picture")),
+        **_air(_generator(seed, n, "air")),
+        "dome": _dome(_generator(seed, n, "dome"), tissue["thickness"]),
     }
     seeds = _generator(seed, n, "phantom")
     while True:
@@ -120,3 +122,13 @@ def _pull(rng: np.random.Generator, farthest: float) -> dict[str, float]:
 def _picture(rng: np.random.Generator) -> dict[str, Any]:
     """Sensor noise and compression."""
     return {"noise": rng.uniform(0.003, 0.015), "crf": int(rng.integers(10, 28))}
+
+
+def _air(rng: np.random.Generator) -> dict[str, float]:
+    """From dull to dripping tissue; in one clip of four with smoke before it."""
+    return {"wet": rng.uniform(0.3, 2.0), "smoke": rng.uniform(0.05, 0.3) if rng.random() < 0.25 else 0.0}
+
+
+def _dome(rng: np.random.Generator, thickness: float) -> float:
+    """In one clip of three the tissue is a dome, up to a third of its thickness high [m]."""
+    return rng.uniform(0.1, 0.35) * thickness if rng.random() < 1 / 3 else 0.0

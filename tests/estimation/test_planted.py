@@ -31,13 +31,16 @@ def silent(*_):
     pass
 
 
-def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, held=None, seed=0, places=None):
-    """What the stages before would hand over, made with `values` and then forgotten."""
-    body, motion = slab(), motion or pulled(frames=T, hold=9)
-    made = prepare(body, tuple(values), density=1050.0, places=places)
-    theta = made.theta(values)
+def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, deep=0.015, seed=0, places=None):
+    """What the stages before would hand over, made with `values` on a grid twice as fine and then forgotten.
+
+    deep: from where on the tissue is held [m].
+    """
+    body, fine, motion = slab(), slab(spacing=0.003), motion or pulled(frames=T, hold=9)
+    made = prepare(fine, tuple(values), density=1050.0, places=places, grips=motion)
+    theta, held = made.theta(values), fine.rest[:, 2] > 0.06 + deep
     if stiff is not None:
-        theta[:, 0] *= stiff(body.rest)
+        theta[:, 0] *= stiff(fine.rest)
     per_frame = 2 * made.per_frame(
         {**values, "corotated": {"E": theta[:, 0].max(), "nu": values["corotated"]["nu"]}}, FPS
     )
@@ -174,8 +177,7 @@ def test_rounds_double_so_that_their_sum_stays_below_twice_the_clip():
 
 
 def test_how_deep_the_body_is_held_is_found_from_the_spread_of_the_pull():
-    shallow = slab().rest[:, 2] > 0.06 + 0.009
-    _, _, fit, _, laid = estimate(*clip(held=shallow), Estimation(**QUICK), silent)
+    _, _, fit, _, laid = estimate(*clip(deep=0.009), Estimation(**QUICK), silent)
     depth = fit.identifiability["held.depth"]
     assert depth["value"] == pytest.approx(0.009, abs=0.002)
     assert fit.held_out["support"]["depth"] == depth["value"]

@@ -21,6 +21,8 @@ def test_clips_differ_in_what_a_stage_could_be_tuned_to():
         assert values.max() / max(values.min(), 1e-9) > least, name
     assert {c["sides"] for c in clips} == {"free", "held"}
     assert 0 < sum(c["release"] == c["duration"] for c in clips) < 15
+    assert 3 < sum(c["dome"] > 0 for c in clips) < 20
+    assert 2 < sum(c["smoke"] > 0 for c in clips) < 16
     told = [c["ingest"]["focal"] for c in family(11, 30).values()]
     assert 5 < sum(f is None for f in told) < 25
 
