@@ -63,6 +63,8 @@ Say = Callable[[float, float, str], None]
 
 FLOOR = 0.01
 """Least standard deviation of a tracked displacement, as a share of the grid's spacing."""
+FINER, FINELY = 1.5, 3
+"""How many times finer the grid is that a fit ends on, and how many iterations it takes there at most."""
 STILL = 0.5
 """Motion below which a track is taken to stand still [px]."""
 
@@ -276,14 +278,31 @@ def _weighed(
     for a, share in table:
         history.append({"round": "otherwise", "about": a.one.about, "share": share, "misfit": number(a.cost)})
     shifts = {a.one.about: (a.x - solution.x, share) for a, share in table}
-    gridless, doubt = on_no_grid(trial, solution.x)
     model = {about: share * np.outer(d, d) for about, (d, share) in shifts.items()}
+    trial, fine = _finely(trial, solution, ends, settings, history, _part(progress, 0.7, 0.8))
+    off, doubt = on_no_grid(trial, fine.x)
     model |= {
+        "grid": np.outer(fine.x - solution.x, fine.x - solution.x),
         "periods on the grid": doubt,
-        "particles": resolution(trial, solution.x),
-        "decay on the grid": decay(trial, solution.x),
+        "particles": resolution(trial, fine.x),
+        "decay on the grid": decay(trial, fine.x),
     }
-    return trial, solution, model, gridless
+    return trial, fine, model, off
+
+
+def _finely(
+    trial: Trial, solution: Solution, ends: list[int], settings: Estimation, history: list, progress: Say
+) -> tuple[Trial, Solution]:
+    """The fit brought to a finer grid, on which a ring-down's shorter waves run as fast as they should."""
+    fine = replace(trial, laying=trial.laying.finer(FINER))
+    change = on_no_grid(fine, solution.x)[0] - on_no_grid(trial, solution.x)[0]
+    begin = np.clip(solution.x - change, *trial.wanted.bounds)
+    few = settings.model_copy(update={"iterations": min(settings.iterations, FINELY)})
+
+    def said(done: float, of: float, text: str) -> None:
+        progress(max(done - 0.25, 0.0) / 0.3, 1.0, f"on a finer grid: {text}")
+
+    return descend(fine, begin, ends, few, history, said)
 
 
 def _part(progress: Say, begin: float, end: float) -> Say:
@@ -351,7 +370,7 @@ def _refined(
         prepared.simulator, path, theta, chosen, trial.observation, train=train, judge=judge, image=image,
         image_weight=settings.image_weight, iterations=settings.field_iterations, smoothness=settings.smoothness,
         limits=(np.array([p.low for p in ends]), np.array([p.high for p in ends])),
-        progress=lambda done, of, text: progress(0.7 + 0.25 * done / of, 1.0, text),
+        progress=lambda done, of, text: progress(0.8 + 0.15 * done / of, 1.0, text),
     )  # fmt: skip
     return refined.theta, refined
 

@@ -168,6 +168,10 @@ class Laying:
         """The same with another edge."""
         return replace(self, margin=margin, rim=rim, kept={})
 
+    def finer(self, times: float) -> Self:
+        """The same on a grid that many times as fine."""
+        return replace(self, columns=finer(self.columns, times), kept={})
+
     @cached_property
     def whole(self) -> Columns:
         """With what lies beyond the picture."""

@@ -19,7 +19,6 @@ import numpy as np
 from surgisim.artifacts.camera import Camera
 from surgisim.estimation.gauss_newton import WIDTH, Solution, misfit
 from surgisim.estimation.identify import spread_of
-from surgisim.estimation.lay import finer
 from surgisim.estimation.rounds import INDEPENDENT
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import EDGES
@@ -33,8 +32,6 @@ LENS = 0.3
 SLOPE, BEND = 0.15, 0.4
 """Spread of a surface's slope, each way, and of its bend, where its shape was guessed from one view: on ten clips of
 family 900 those of light alone are .02 to .27 and .02 to .44 off."""
-FINER = 1.5
-"""The fit's grid spacing over that of a finer one."""
 PERIOD = 0.4
 """Over the number of cells through the tissue, how much too high a grid makes a modulus and a viscosity that are fitted
 to a ring-down: twice what its periods are too long by, .056, .044 and .030 with 3.2, 4.6 and 6.4 cells
@@ -55,8 +52,8 @@ DECAY = 0.42
 .104, .047 and .026 with 2, 3 and 4 cells (docs/verification.md, "Decay of a viscous rod")."""
 STEPS, ENOUGH = 4, 0.01
 """Most steps to where a fit lies otherwise, and the share of its cost that one must win for another."""
-AS_IT_IS, GRID = "nothing", "grid"
-"""What is changed where a fit is only brought to where these steps would bring it, and where its grid is finer."""
+AS_IT_IS = "nothing"
+"""What is changed where a fit is only brought to where these steps would bring it."""
 
 Say = Callable[[float, float, str], None]
 Make = Callable[..., Prepared]
@@ -117,8 +114,6 @@ def otherwise(trial: Trial, camera: Camera, points: np.ndarray, make: Make) -> I
     yield Otherwise(AS_IT_IS, trial)
     yield from _views(trial, camera, points, make)
     laying = trial.laying
-    fine = replace(laying, columns=finer(laying.whole, FINER), margin=0.0, kept={})
-    yield Otherwise(GRID, replace(trial, laying=fine))
     farther = laying.ending(laying.margin + EDGE * trial.wanted.depth.size, laying.rim)
     yield Otherwise("edge", replace(trial, laying=farther), told=True)
     yield from _laws(trial, make)

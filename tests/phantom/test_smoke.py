@@ -5,7 +5,7 @@ import pytest
 
 from surgisim.config.phantom import Phantom
 from surgisim.phantom.case import invent
-from surgisim.phantom.smoke import GREY, smoke
+from surgisim.phantom.smoke import smoke
 
 
 def test_smoke_brings_light_to_its_own_grey_and_moves_on():
