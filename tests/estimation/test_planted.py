@@ -31,12 +31,12 @@ def silent(*_):
     pass
 
 
-def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, deep=0.015, seed=0, places=None):
-    """What the stages before would hand over, made with `values` on a grid twice as fine and then forgotten.
+def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, deep=0.015, seed=0, places=None, spacing=0.003):
+    """What the stages before would hand over, made with `values` on a grid of `spacing` [m] and then forgotten.
 
     deep: from where on the tissue is held [m].
     """
-    body, fine, motion = slab(), slab(spacing=0.003), motion or pulled(frames=T, hold=9)
+    body, fine, motion = slab(), slab(spacing=spacing), motion or pulled(frames=T, hold=9)
     made = prepare(fine, tuple(values), density=1050.0, places=places, grips=motion)
     theta, held = made.theta(values), fine.rest[:, 2] > 0.06 + deep
     if stiff is not None:
@@ -72,9 +72,10 @@ def test_planted_parameters_are_found_from_a_pull_and_its_release():
     assert pytest.approx(900.0, rel=0.2) == E
     assert nu == pytest.approx(0.38, abs=0.02)
     assert fit.held_out["fitted"] < 0.5 * fit.held_out["default"]
-    # Two and a half cells through the tissue: the grid alone leaves a modulus open by a quarter, which is not told.
-    assert fit.identifiability["corotated.nu"]["told"]
-    assert fit.identifiability["corotated.E"]["high"] < 2 * fit.identifiability["corotated.E"]["low"]
+    # Two and a half cells through the tissue: what a finer grid changes is all that is open of Poisson's ratio.
+    assert fit.identifiability["corotated.E"]["told"]
+    assert fit.identifiability["corotated.nu"]["rests_on"].keys() == {"grid"}
+    assert fit.identifiability["corotated.E"]["high"] < 1.5 * fit.identifiability["corotated.E"]["low"]
     for name, true in (("corotated.E", 900.0), ("corotated.nu", 0.38), ("newtonian.eta", 1.2), ("held.depth", 0.015)):
         assert fit.identifiability[name]["low"] < true < fit.identifiability[name]["high"], name
     edges = {h["about"]: h["share"] for h in fit.history if h["round"] == "otherwise" and "beyond" in h["about"]}
@@ -145,7 +146,7 @@ def test_a_lump_whose_place_is_given_tells_how_stiff_it_is():
     fixed = ["corotated.E", "corotated.nu", "newtonian.eta"]
     given = {law: {"center": place.center, "extent": place.extent} for law, place in places.items()}
     settings = Estimation(**QUICK, terms=list(known), start=known, fixed=fixed, places=given, support=False)
-    planted = clip(TRUE | {"stiff_inclusion": {"s": 3.0}}, noise=1e-5, places=places)
+    planted = clip(TRUE | {"stiff_inclusion": {"s": 3.0}}, noise=1e-5, places=places, spacing=0.006)
     _, physics, *_ = estimate(*planted, settings, silent)
     assert physics.terms["stiff_inclusion"]["s"]["value"] == pytest.approx(3.0, rel=0.1)
     assert physics.places["stiff_inclusion"]["extent"] == 0.006
