@@ -179,7 +179,10 @@ class Laying:
 
     def at(self, depth: float, motion: Motion, worker: int) -> tuple[Prepared, Observation]:
         """A body held from `depth` [m] on, and what it is compared with; `worker`: whose arrays it uses."""
-        key = (round(depth, 7), np.round(motion.center_rest, 7).tobytes(), np.round(motion.radius, 7).tobytes())
+        # Laid for the rounded numbers: which of several that round alike comes first is for the threads to race for.
+        depth = round(depth, 7)
+        motion = replace(motion, center_rest=np.round(motion.center_rest, 7), radius=np.round(motion.radius, 7))
+        key = (depth, motion.center_rest.tobytes(), motion.radius.tobytes())
         mine = self.kept.setdefault(worker, {})
         if key not in mine:
             if len(mine) >= KEPT:
