@@ -81,7 +81,6 @@ class Columns:
             spacing=self.spacing,
         )
 
-
     @property
     def _plane(self) -> np.ndarray:
         """Depth of the plane that lies nearest the surface, at every column [m], (N,)."""
