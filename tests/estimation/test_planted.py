@@ -75,7 +75,7 @@ def test_planted_parameters_are_found_from_a_pull_and_its_release():
     # Two and a half cells through the tissue: what a finer grid changes is all that is open of Poisson's ratio.
     assert fit.identifiability["corotated.E"]["told"]
     assert fit.identifiability["corotated.nu"]["rests_on"].keys() == {"grid"}
-    assert fit.identifiability["corotated.E"]["high"] < 1.5 * fit.identifiability["corotated.E"]["low"]
+    assert fit.identifiability["corotated.E"]["high"] < 2 * fit.identifiability["corotated.E"]["low"]
     for name, true in (("corotated.E", 900.0), ("corotated.nu", 0.38), ("newtonian.eta", 1.2), ("held.depth", 0.015)):
         assert fit.identifiability[name]["low"] < true < fit.identifiability[name]["high"], name
     edges = {h["about"]: h["share"] for h in fit.history if h["round"] == "otherwise" and "beyond" in h["about"]}
