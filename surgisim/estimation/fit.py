@@ -55,6 +55,7 @@ from surgisim.estimation.stated import by_phase
 from surgisim.estimation.support import EDGES, Support, open_depth
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
+from surgisim.mpm.simulator import Breakdown
 from surgisim.physics.catalogue import choose, columns
 from surgisim.physics.place import Place
 from surgisim.problem import Problem
@@ -293,7 +294,10 @@ def _weighed(
 def _finely(
     trial: Trial, solution: Solution, ends: list[int], settings: Estimation, history: list, progress: Say
 ) -> tuple[Trial, Solution]:
-    """The fit brought to a finer grid, on which a ring-down's shorter waves run as fast as they should."""
+    """The fit brought to a finer grid, on which a ring-down's shorter waves run as fast as they should.
+
+    As it was where that cannot be simulated; `history` says so.
+    """
     fine = replace(trial, laying=trial.laying.finer(FINER))
     change = on_no_grid(fine, solution.x)[0] - on_no_grid(trial, solution.x)[0]
     begin = np.clip(solution.x - change, *trial.wanted.bounds)
@@ -302,7 +306,14 @@ def _finely(
     def said(done: float, of: float, text: str) -> None:
         progress(max(done - 0.25, 0.0) / 0.3, 1.0, f"on a finer grid: {text}")
 
-    return descend(fine, begin, ends, few, history, said)
+    try:
+        if fine.residual(begin) is None:
+            raise Breakdown("what fits on the wider grid cannot be simulated on a finer one")
+        return descend(fine, begin, ends, few, history, said)
+    except Breakdown as breakdown:
+        # A finer grid follows a sharper fold, and can turn inside out where a wider one does not.
+        history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
+        return trial, solution
 
 
 def _part(progress: Say, begin: float, end: float) -> Say:
