@@ -41,3 +41,10 @@ def test_what_the_jaws_carry_back_is_still_held():
 def test_what_creeps_back_does_not_say_that_it_is_free():
     way = carried(18)
     assert recoiled(way, following(standing(way)), 5, THOUGHT) == THOUGHT
+
+
+def test_jaws_that_are_not_seen_do_not_say_that_tissue_goes_back_alone():
+    way = carried(4)
+    unseen = following(standing(way))
+    unseen.jaws[LET_GO:] = np.nan
+    assert recoiled(way, unseen, 5, THOUGHT) == THOUGHT

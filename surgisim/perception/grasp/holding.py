@@ -88,7 +88,9 @@ def recoiled(course: np.ndarray, follows: Following, begin: int, end: int) -> in
     share = way @ way[top] / max(way[top] @ way[top], 1e-9)
     last = begin + int(np.flatnonzero(share[begin : end + 1] >= AWAY)[-1])
     after = min(last + QUICK, len(course) - 1)
-    back = course[after] - course[last]
-    jaws = np.nansum(follows.jaws[last:after], axis=0)
-    alone = np.linalg.norm(back - jaws) > PARTLY * np.linalg.norm(back)
+    back, jaws = course[after] - course[last], follows.jaws[last:after]
+    if not np.isfinite(jaws).all(-1).any():
+        return end
+    # In a frame in which the jaws are not seen they go as in the others.
+    alone = np.linalg.norm(back - (after - last) * np.nanmean(jaws, axis=0)) > PARTLY * np.linalg.norm(back)
     return last if alone and share[last] - share[after] > FALL else end
