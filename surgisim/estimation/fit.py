@@ -42,20 +42,20 @@ from surgisim.estimation.picture import picture_loss
 from surgisim.estimation.refine import Refined, refine
 from surgisim.estimation.rounds import (
     INDEPENDENT,
-    choose_start,
     choose_support,
     descend,
     number,
+    plain,
     settle_grip,
     settle_pull,
     windows,
 )  # fmt: skip
 from surgisim.estimation.search import Search, search
+from surgisim.estimation.starts import choose_start
 from surgisim.estimation.stated import by_phase
 from surgisim.estimation.support import EDGES, Support, open_depth
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
-from surgisim.mpm.simulator import Breakdown
 from surgisim.physics.catalogue import choose, columns
 from surgisim.physics.place import Place
 from surgisim.problem import Problem
@@ -64,8 +64,8 @@ Say = Callable[[float, float, str], None]
 
 FLOOR = 0.01
 """Least standard deviation of a tracked displacement, as a share of the grid's spacing."""
-FINER, FINELY = 1.5, 3
-"""How many times finer the grid is that a fit ends on, and how many iterations it takes there at most."""
+FINER = 1.5
+"""How many times finer the grid is that a fit ends on."""
 STILL = 0.5
 """Motion below which a track is taken to stand still [px]."""
 
@@ -280,7 +280,7 @@ def _weighed(
         history.append({"round": "otherwise", "about": a.one.about, "share": share, "misfit": number(a.cost)})
     shifts = {a.one.about: (a.x - solution.x, share) for a, share in table}
     model = {about: share * np.outer(d, d) for about, (d, share) in shifts.items()}
-    trial, fine = _finely(trial, solution, ends, settings, history, _part(progress, 0.7, 0.8))
+    trial, fine = _finely(trial, solution, history, _part(progress, 0.7, 0.8))
     off, doubt = on_no_grid(trial, fine.x)
     model |= {
         "grid": np.outer(fine.x - solution.x, fine.x - solution.x),
@@ -291,29 +291,22 @@ def _weighed(
     return trial, fine, model, off
 
 
-def _finely(
-    trial: Trial, solution: Solution, ends: list[int], settings: Estimation, history: list, progress: Say
-) -> tuple[Trial, Solution]:
+def _finely(trial: Trial, solution: Solution, history: list, progress: Say) -> tuple[Trial, Solution]:
     """The fit brought to a finer grid, on which a ring-down's shorter waves run as fast as they should.
 
-    As it was where that cannot be simulated; `history` says so.
+    By steps of the derivative that the wider grid gave: there each costs a fifth. As it was where that cannot be
+    simulated; `history` says so.
     """
     fine = replace(trial, laying=trial.laying.finer(FINER))
     change = on_no_grid(fine, solution.x)[0] - on_no_grid(trial, solution.x)[0]
     begin = np.clip(solution.x - change, *trial.wanted.bounds)
-    few = settings.model_copy(update={"iterations": min(settings.iterations, FINELY)})
-
-    def said(done: float, of: float, text: str) -> None:
-        progress(max(done - 0.25, 0.0) / 0.3, 1.0, f"on a finer grid: {text}")
-
-    try:
-        if fine.residual(begin) is None:
-            raise Breakdown("what fits on the wider grid cannot be simulated on a finer one")
-        return descend(fine, begin, ends, few, history, said)
-    except Breakdown as breakdown:
+    (found,) = answers(solution, trial.wanted, [Otherwise("the grid were finer", fine, begin=begin)], progress)
+    if found.residual is None:
         # A finer grid follows a sharper fold, and can turn inside out where a wider one does not.
-        history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
+        history.append({"round": "finer grid", "cost": None, "broke": "what fits on the wider grid"})
         return trial, solution
+    history.append({"round": "finer grid", "cost": number(found.cost)} | plain(trial.wanted, found.x))
+    return fine, Solution(found.x, found.residual, solution.jacobian)
 
 
 def _part(progress: Say, begin: float, end: float) -> Say:

@@ -17,9 +17,9 @@ from functools import partial
 import numpy as np
 
 from surgisim.artifacts.camera import Camera
-from surgisim.estimation.gauss_newton import WIDTH, Solution, misfit
+from surgisim.estimation.gauss_newton import WIDTH, Solution
 from surgisim.estimation.identify import spread_of
-from surgisim.estimation.rounds import INDEPENDENT
+from surgisim.estimation.rounds import INDEPENDENT, cost_of
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import EDGES
 from surgisim.estimation.trial import Trial, at_once
@@ -237,11 +237,6 @@ def shares(solution: Solution, wanted: Search, found: list[Answer]) -> list[floa
         else:
             result.append(_mean_square(weights, solution.residual, a.residual, scale))
     return result
-
-
-def cost_of(r: np.ndarray, x: np.ndarray, wanted: Search) -> float:
-    """What the descent minimises."""
-    return INDEPENDENT * misfit(r) + float((((x - wanted.start) / wanted.spread) ** 2).sum())
 
 
 def _mean_square(weights: np.ndarray, here: np.ndarray, there: np.ndarray, scale: float) -> float:

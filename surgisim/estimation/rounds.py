@@ -17,7 +17,10 @@ from surgisim.estimation.observation import PHASES
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import EDGES, MIDDLE, SHARES
 from surgisim.estimation.trial import WORKERS, Trial, at_once
+from surgisim.mpm.grip import runs
 from surgisim.mpm.simulator import Breakdown, Run
+from surgisim.mpm.stable import shear_speed
+from surgisim.physics.catalogue import choose
 from surgisim.problem import Problem
 
 INDEPENDENT = 0.02
@@ -28,14 +31,28 @@ NEARER = (0.0, -0.7, -1.4)
 """How far the grip comes nearer there, in spreads of its prior."""
 GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
 """How firmly instruments may hold, tried in turn."""
-CLOSELY = 4
-"""About how many of the best starts closer ones are tried."""
+SWINGS = 4
+"""How many swings of the tissue the shortest pull lasts at least, where its shape alone is asked for."""
 PULLS = 4
 """Most iterations on the shape of a pull, before its release is looked at."""
 SETTLED = 4
 """Frames after a release that the first window must hold, or it says nothing of modulus and viscosity."""
 
 Say = Callable[[float, float, str], None]
+
+
+def unhurried(trial: Trial, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    """x, or softer, where the tissue still swings several times as fast as it is pulled: the shapes it takes are then
+    the same, and softer tissue takes longer steps."""
+    loads = runs(phase == PHASES.index("load"))
+    if not loads:
+        return x
+    seconds = min(last - first + 1 for first, last in loads) / trial.fps
+    speed = 4 * SWINGS * trial.depth(x) / seconds
+    laws, values = choose(trial.bodies[0].terms), trial.wanted.values(x)
+    alone = {name: law for name, law in laws.items() if law.energy is not None}
+    found = shear_speed(alone, {name: law.row(values[name]) for name, law in alone.items()}, trial.bodies[0].density)
+    return np.clip(trial.wanted.paced(x, min(0.0, 2 * np.log(speed / found))), *trial.wanted.bounds)
 
 
 def settle_grip(trial: Trial, x: np.ndarray, history: list, theta=None) -> tuple[Trial, Run]:
@@ -67,7 +84,7 @@ def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> 
     Depth, Poisson's ratio and how far the grip comes nearer all shape the spread of a load, so none is judged alone:
     first these on the most expected edge, then the other edges at the best of them.
     """
-    wanted, start = trial.wanted, trial.wanted.start
+    wanted, start = trial.wanted, unhurried(trial, trial.wanted.start, phase)
     driven = trial.fitted[phase[trial.fitted] < PHASES.index("release")]
     if not len(driven):
         return trial, start
@@ -140,34 +157,6 @@ def settle_pull(
     return whole(found.x)
 
 
-def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np.ndarray:
-    """The best of a few starting points about `begin`.
-
-    A ring-down misfits by whole periods: from a modulus a few times too high, a descent ends there.
-    """
-    wanted, points = trial.wanted, trial.wanted.starts(begin)
-
-    def costs_of(points: list[np.ndarray]) -> list[float]:
-        return [
-            np.inf if r is None else INDEPENDENT * misfit(r) + float((((x - wanted.start) / wanted.spread) ** 2).sum())
-            for r, x in zip(trial.together(points), points, strict=True)
-        ]
-
-    say(0.13, 1.0, f"trying {len(points)} starts")
-    costs = costs_of(points)
-    more = [y for k in np.argsort(costs, kind="stable")[:CLOSELY] for y in wanted.closer(points[k])]
-    say(0.22, 1.0, f"trying {len(more)} starts close to the best")
-    points, costs = points + more, costs + costs_of(more)
-    for x, cost in zip(points, costs, strict=True):
-        history.append({"round": "start", "cost": number(cost)} | plain(wanted, x))
-    if not np.isfinite(costs).any():
-        raise Breakdown(
-            "estimation: the body turns inside out under the recorded motion at every start. Check the grip and its "
-            "path (tracking), or start from other values (estimation.start)."
-        )
-    return points[int(np.argmin(costs))]
-
-
 def descend(
     trial: Trial, x: np.ndarray, ends: list[int], settings: Estimation, history: list, say: Say
 ) -> tuple[Trial, Solution]:
@@ -238,6 +227,11 @@ def plain(wanted: Search, x: np.ndarray) -> dict[str, float]:
     values = wanted.values(x)
     laws = {f"{law}.{param}": values[law][param] for law, param, _ in wanted.free}
     return laws | {u.name: float(v) for u, v in zip(wanted.open, x[len(wanted.free) :], strict=True)}
+
+
+def cost_of(r: np.ndarray, x: np.ndarray, wanted: Search) -> float:
+    """What a descent minimises: the misfit's share that counts, and how far x lies from its prior."""
+    return INDEPENDENT * misfit(r) + float((((x - wanted.start) / wanted.spread) ** 2).sum())
 
 
 def number(value: float) -> float | None:

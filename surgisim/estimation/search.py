@@ -1,6 +1,5 @@
 """The few numbers a fit searches, and their way into a simulation."""
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,13 +17,8 @@ PRIOR_LOG = 1.5
 """Standard deviation of the prior on a logarithm: tissue moduli spread over a factor 4-5 either way."""
 REACH = 2.0
 """How many prior deviations from its start a logarithm may go."""
-FIRST_STEPS, SECOND_STEPS = tuple(0.4 * k for k in range(-6, 3)), (0.5, 1.2, 1.9)
-"""Offsets of the first logarithm in the scan that precedes the descent, and of how the second then lies to it: two
-periods of a ring-down are told from those of one a fifth faster, so wider steps would pass between."""
-CLOSER_STEPS = ((-0.2, 0.0), (0.2, 0.0), (0.0, -0.35), (0.0, 0.35))
-"""Offsets of both, and of how the second then lies to the first, about the best of those."""
-OPENING_STEPS = (-0.5, 0.0)
-"""The same of the moments of release [frames]."""
+PACE = {"Pa": 1.0, "Pa s": 0.5, "s": -0.5}
+"""Power of a modulus with which a number of this unit goes where only the pace of a swing changes."""
 PRIOR_SHARE = 0.3
 """The same for a plain parameter, as a share of its range."""
 
@@ -82,32 +76,19 @@ class Search:
         reach = np.where(logarithmic, REACH * self.spread, np.inf)
         return np.maximum(low, self.start - reach), np.minimum(high, self.start + reach)
 
-    def starts(self, begin: np.ndarray) -> list[np.ndarray]:
-        """Points to try first: `begin` with its first two logarithms stepped, and with them the moments of release.
+    @property
+    def paces(self) -> np.ndarray:
+        """Which numbers set the pace of a swing or how it dies off, (M,) bool."""
+        laws = [p.logarithmic and p.unit in PACE for *_, p in self.free]
+        return np.array(laws + [False] * len(self.open), bool)
 
-        Soft tissue let go early and stiff tissue let go late are two valleys, and no descent crosses between.
-        """
-        first, second, *_ = [*self._logarithms(), None, None]
-        opens = np.array([name.endswith(".release") for name in self.names])
-        steps = itertools.product(
-            FIRST_STEPS if first is not None else (0.0,),
-            SECOND_STEPS if second is not None else (0.0,),
-            OPENING_STEPS if opens.any() else (0.0,),
-        )
-        return [self._stepped(begin + opening * opens, step, beside) for step, beside, opening in steps]
-
-    def closer(self, begin: np.ndarray) -> list[np.ndarray]:
-        """Points about one of those."""
-        return [self._stepped(begin, *steps) for steps in CLOSER_STEPS] if self._logarithms() else []
-
-    def _logarithms(self) -> list[int]:
-        return [k for k, (*_, p) in enumerate(self.free) if p.logarithmic][:2]
-
-    def _stepped(self, begin: np.ndarray, step: float, beside: float) -> np.ndarray:
-        point = begin.copy()
-        for k, by in zip(self._logarithms(), (step, step + beside), strict=False):
-            point[k] += by
-        return np.clip(point, *self.bounds)
+    def paced(self, x: np.ndarray, modulus: float, damping: float = 0.0) -> np.ndarray:
+        """x with moduli that many logarithms higher, at the same swing at another pace; then viscosities so much."""
+        moved = x.copy()
+        for k in np.flatnonzero(self.paces):
+            unit = self.free[k][-1].unit
+            moved[k] += PACE[unit] * modulus + (damping if unit == "Pa s" else 0.0)
+        return moved
 
     def values(self, x: np.ndarray) -> Values:
         """Law -> parameter -> value at x."""

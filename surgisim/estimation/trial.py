@@ -1,5 +1,6 @@
 """One set-up to compare simulations with a clip in, from several threads at once."""
 
+import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -105,7 +106,7 @@ class Trial:
             run, observation = self._run(x, worker, last)
         except Breakdown:
             return None
-        return self._apart(run, observation, last)
+        return self.judged(run.u, observation, last)
 
     def of_frames(self, each: np.ndarray) -> np.ndarray:
         """What each residual's frame has of `each`, (T,), in the order of `residual`, (R,)."""
@@ -124,12 +125,13 @@ class Trial:
         near = len(middles) + np.linalg.norm(light.rest[:, None] - middles, axis=-1).argmin(1)
         return np.concatenate([tracks, np.repeat(near, len(self.fitted))])
 
-    def _apart(self, run: Run, observation: Observation, last: int) -> np.ndarray:
+    def judged(self, u: np.ndarray, observation: Observation, last: int) -> np.ndarray:
+        """Weighted misfit of nodal displacements u [m], (T, A, 3), on fitted frames up to `last`, (R,)."""
         frames = self.fitted[self.fitted <= last]
-        r = observation.residual(run.u, frames)
+        r = observation.residual(u, frames)
         r = (self.error.whiten(r, frames) if self.error else r).ravel()
         light = observation.light
-        return np.concatenate([r, light.residual(run.u, frames).ravel()]) if light else r
+        return np.concatenate([r, light.residual(u, frames).ravel()]) if light else r
 
     def _run(self, x: np.ndarray, worker: int, last: int | None) -> tuple[Run, Observation]:
         values = self.wanted.values(x)
@@ -138,6 +140,21 @@ class Trial:
         first = min(self.quiet, last or self.quiet)
         run = here.bodies[worker].simulator.run(here.theta(values), drive, first=first, last=last)
         return run.after(first), here.observation
+
+    def closely(
+        self, x: np.ndarray, since: int, last: int, within: int, worker: int = 0
+    ) -> tuple[np.ndarray, np.ndarray, Observation]:
+        """Nodal displacements at x up to frame `since`, those from it to frame `last` at `within` states a frame [m],
+        and what they are compared with."""
+        values = self.wanted.values(x)
+        here, motion = self.stand(x, worker)
+        steps = within * math.ceil(here.per_frame(values) / within)
+        drive = here.drive(values, per_frame=steps, motion=motion)
+        simulator, theta, first = here.bodies[worker].simulator, here.theta(values), min(self.quiet, since)
+        before = simulator.run(theta, drive, first=first, last=since)
+        closer = replace(drive, per_frame=steps // within)
+        after = simulator.run(theta, closer, begin=before.state(-1), first=since * within, last=last * within)
+        return before.after(first).u, after.u, here.observation
 
     @cached_property
     def quiet(self) -> int:
@@ -159,7 +176,7 @@ class Trial:
         motions = [self.wanted.motion(x, self.motion) for x in points]
         drives = [self.drive(v, per_frame=most, motion=m) for v, m in zip(values, motions, strict=True)]
         runs = self.batch.run([self.theta(v) for v in values], drives, last=last)
-        return [None if isinstance(run, Breakdown) else self._apart(run, self.observation, last) for run in runs]
+        return [None if isinstance(run, Breakdown) else self.judged(run.u, self.observation, last) for run in runs]
 
     @cached_property
     def batch(self) -> Batch:

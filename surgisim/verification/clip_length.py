@@ -18,8 +18,9 @@ from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.observation import observe, phases
-from surgisim.estimation.rounds import choose_start, descend, windows
+from surgisim.estimation.rounds import descend, windows
 from surgisim.estimation.search import search
+from surgisim.estimation.starts import choose_start
 from surgisim.estimation.trial import Trial
 from surgisim.mpm.setup import prepare
 from surgisim.verification.drawing import COLORS, panels
@@ -45,20 +46,11 @@ def measure(progress, quick: bool = False) -> dict:
 
 def fit(frames: int) -> dict:
     """One search: processor time [s], frames simulated, and what was found."""
-    body, motion = _slab(), _pulls(frames)
-    points = body.rest[body.surface].astype(float)
-    bodies = [prepare(body, tuple(TRUE), density=1050.0, carried=points) for _ in range(2)]
-    tracks = _tracks(bodies[0], motion, points, frames)
-    ledger: list[int] = []
-    observation = observe(tracks, motion, CAMERA, bodies[0].simulator, floor=1e-5)
-    wanted = search(list(TRUE), {}, [])
-    trial = _Counted(
-        bodies, wanted, motion, observation, body.held, FPS, frames, np.arange(1, frames), 1.0, ledger=ledger
-    )
-    settings, begun = Estimation(first_window=0.25, field_iterations=0), time.process_time()
-    begin = choose_start(trial, wanted.start, [], lambda *_: None)
-    ends = windows(trial.fitted, phases(motion, frames), settings.first_window)
-    _, solution = descend(trial, begin, ends, settings, [], lambda *_: None)
+    planted, ledger = trial(frames)
+    wanted, settings, begun = planted.wanted, Estimation(first_window=0.25, field_iterations=0), time.process_time()
+    begin = choose_start(planted, wanted.start, [], lambda *_: None)
+    ends = windows(planted.fitted, phases(planted.motion, frames), settings.first_window)
+    _, solution = descend(planted, begin, ends, settings, [], lambda *_: None)
     seconds = time.process_time() - begun
     found = wanted.values(solution.x)
     return {
@@ -72,6 +64,21 @@ def fit(frames: int) -> dict:
     }
 
 
+def trial(frames: int) -> tuple[Trial, list[int]]:
+    """A clip whose truth is TRUE, to be searched, and where the frames that each of its runs simulates are noted."""
+    body, motion = _slab(), _pulls(frames)
+    points = body.rest[body.surface].astype(float)
+    bodies = [prepare(body, tuple(TRUE), density=1050.0, carried=points) for _ in range(2)]
+    tracks = _tracks(bodies[0], motion, points, frames)
+    ledger: list[int] = []
+    observation = observe(tracks, motion, CAMERA, bodies[0].simulator, floor=1e-5)
+    wanted = search(list(TRUE), {}, [])
+    counted = _Counted(
+        bodies, wanted, motion, observation, body.held, FPS, frames, np.arange(1, frames), 1.0, ledger=ledger
+    )
+    return counted, ledger
+
+
 class _Counted(Trial):
     """A trial that notes how many frames each of its runs simulated."""
 
@@ -83,6 +90,10 @@ class _Counted(Trial):
         run, observation = super()._run(x, worker, last)
         self.ledger.append(len(run.u) - 1)
         return run, observation
+
+    def closely(self, x, since, last, within, worker=0):
+        self.ledger.append(last)
+        return super().closely(x, since, last, within, worker)
 
 
 def _slab() -> Body:

