@@ -251,7 +251,7 @@ def _lit(trial: Trial, body: Body, tracks: Tracks, frames: Frames, masks: Masks,
 def _weighed(
     trial: Trial,
     solution: Solution,
-    ask: Callable[[Trial], Iterator[Otherwise]],
+    ask: Callable[[Trial, np.ndarray], Iterator[Otherwise]],
     ends: list[int],
     settings: Estimation,
     history: list,
@@ -264,18 +264,18 @@ def _weighed(
     """
     first, wanted = trial, trial.wanted
     found = answers(solution, wanted, list(rivals(trial, solution.x)), _part(progress, 0.55, 0.63))
-    chosen = better(solution, wanted, found)
+    chosen = better(solution, wanted, found, trial.regions)
     if chosen:
         begun = Answer(Otherwise("as first found", first, rival=True), solution.x, None, found[0].cost)
         found = [a for a in found if a not in (chosen, found[0])] + [begun] * (chosen is not found[0])
         trial, solution = descend(chosen.one.trial, chosen.x, ends, settings, history, progress)
     else:
         found = found[1:]
-    here, *others = answers(solution, wanted, list(ask(trial)), _part(progress, 0.63, 0.7))
+    here, *others = answers(solution, wanted, list(ask(trial, solution.x)), _part(progress, 0.63, 0.7))
     if here.residual is not None:
         solution = Solution(here.x, here.residual, solution.jacobian)
     found += others
-    table = list(zip(found, shares(solution, wanted, found), strict=True))
+    table = list(zip(found, shares(solution, wanted, found, trial.regions), strict=True))
     for a, share in table:
         history.append({"round": "otherwise", "about": a.one.about, "share": share, "misfit": number(a.cost)})
     shifts = {a.one.about: (a.x - solution.x, share) for a, share in table}

@@ -86,6 +86,24 @@ def regional(J: np.ndarray, r: np.ndarray, share: float, spread: np.ndarray, reg
     White, Maximum likelihood estimation of misspecified models, Econometrica 50, 1982; clusters as in Liang and Zeger,
     Longitudinal data analysis using generalized linear models, Biometrika 73, 1986.
     """
+    root, among, turn = _pulled_apart(J, r, share, spread, region)
+    wide = root @ turn
+    return (wide * np.maximum(among, 1.0)) @ wide.T
+
+
+def overstated(J: np.ndarray, r: np.ndarray, share: float, spread: np.ndarray, region: np.ndarray) -> float:
+    """How many times less differences of the misfit tell than they say, 1 at least: as `regional`, on average.
+
+    Pauli, Racugno and Ventura, Bayesian composite marginal likelihoods, Statistica Sinica 21 (2011).
+    """
+    return float(np.maximum(_pulled_apart(J, r, share, spread, region)[1], 1.0).mean())
+
+
+def _pulled_apart(
+    J: np.ndarray, r: np.ndarray, share: float, spread: np.ndarray, region: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A root of the covariance that the information gives, (M, M), how many times more than that regions pull at its
+    directions, (M,), and those directions, (M, M)."""
     weight = np.minimum(1.0, WIDTH / np.maximum(np.abs(r), 1e-12))
     pulls = np.zeros((int(region.max()) + 1, J.shape[1]))
     np.add.at(pulls, region, share * (weight * r)[:, None] * J)
@@ -95,8 +113,7 @@ def regional(J: np.ndarray, r: np.ndarray, share: float, spread: np.ndarray, reg
     # What a region asks for, the fit has already followed in part: as many numbers as there are.
     left = count / max(count - J.shape[1], 1)
     among, turn = np.linalg.eigh(left * (pulls @ root).T @ (pulls @ root))
-    wide = root @ turn
-    return (wide * np.maximum(among, 1.0)) @ wide.T
+    return root, among, turn
 
 
 def spread_of(r: np.ndarray) -> float:

@@ -18,7 +18,7 @@ import numpy as np
 
 from surgisim.artifacts.camera import Camera
 from surgisim.estimation.gauss_newton import WIDTH, Solution
-from surgisim.estimation.identify import spread_of
+from surgisim.estimation.identify import overstated, spread_of
 from surgisim.estimation.rounds import INDEPENDENT, cost_of
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import EDGES
@@ -68,8 +68,6 @@ class Otherwise:
     trial: Trial
     rival: bool = False
     """Whether it competes with what was chosen by how well it fits."""
-    told: bool = False
-    """Whether it is one prior standard deviation of something whose size the clip may tell."""
     begin: np.ndarray | None = None
     """Where the fit begins, if not from the one that is asked about, (M,)."""
     open: np.ndarray | None = None
@@ -106,16 +104,16 @@ def rivals(trial: Trial, x: np.ndarray) -> Iterator[Otherwise]:
     yield from _moduli(trial, x)
 
 
-def otherwise(trial: Trial, camera: Camera, points: np.ndarray, make: Make) -> Iterator[Otherwise]:
-    """What else a fit with a body laid for it takes for granted, each changed; first nothing.
+def otherwise(trial: Trial, x: np.ndarray, camera: Camera, points: np.ndarray, make: Make) -> Iterator[Otherwise]:
+    """What else a fit with a body laid for it that ended at x, (M,), takes for granted, each changed; first nothing.
 
     points: what its grid reaches to at least [m], (Q, 3).
     """
     yield Otherwise(AS_IT_IS, trial)
-    yield from _views(trial, camera, points, make)
+    yield from _views(trial, x, camera, points, make)
     laying = trial.laying
     farther = laying.ending(laying.margin + EDGE * trial.wanted.depth.size, laying.rim)
-    yield Otherwise("edge", replace(trial, laying=farther), told=True)
+    yield Otherwise("edge", replace(trial, laying=farther))
     yield from _laws(trial, make)
 
 
@@ -157,7 +155,7 @@ def _moduli(trial: Trial, x: np.ndarray) -> Iterator[Otherwise]:
                 yield Otherwise(about, trial, True, begin=np.clip(begin, low, high), open=np.arange(len(x)) != k)
 
 
-def _views(trial: Trial, camera: Camera, points: np.ndarray, make: Make) -> Iterator[Otherwise]:
+def _views(trial: Trial, x: np.ndarray, camera: Camera, points: np.ndarray, make: Make) -> Iterator[Otherwise]:
     seen = trial.observation
     middle = np.median(seen.rest[:, :2] / seen.rest[:, 2:], axis=0)
     changes: dict[str, dict[str, float]] = {}
@@ -168,7 +166,8 @@ def _views(trial: Trial, camera: Camera, points: np.ndarray, make: Make) -> Iter
     for about, change in changes.items():
         view = View(camera, middle, **change)
         carried = points * view.factor(points)
-        yield Otherwise(about, seen_as(trial, view, partial(make, carried=carried)), told=True)
+        begin = np.clip(view.alike(x, trial.wanted), *trial.wanted.bounds)
+        yield Otherwise(about, seen_as(trial, view, partial(make, carried=carried)), begin=begin)
 
 
 def seen_as(trial: Trial, view: View, make: Make) -> Trial:
@@ -213,40 +212,31 @@ def answers(solution: Solution, wanted: Search, changed: list[Otherwise], say: S
     return at_once(of, changed)
 
 
-def better(solution: Solution, wanted: Search, found: list[Answer]) -> Answer | None:
-    """The rival that is more probable by far than this fit, if one is."""
+def better(solution: Solution, wanted: Search, found: list[Answer], region: np.ndarray) -> Answer | None:
+    """The rival that is more probable by far than this fit, if one is; region: as for `shares`."""
     best = min(found, key=lambda a: a.cost)
     gain = cost_of(solution.residual, solution.x, wanted) - best.cost
-    return best if 0.5 * gain / spread_of(solution.residual) > BY_FAR else None
+    return best if 0.5 * gain / _unit(solution, wanted, region) > BY_FAR else None
 
 
-def shares(solution: Solution, wanted: Search, found: list[Answer]) -> list[float]:
-    """How often each shift of the numbers counts, squared: a rival's probability.
+def shares(solution: Solution, wanted: Search, found: list[Answer], region: np.ndarray) -> list[float]:
+    """How often each shift of the numbers counts, squared: a rival's probability, and 1 for what was changed by one
+    standard deviation of its prior.
 
-    Otherwise the mean square of how far the thing itself may be from what was taken, over the change that was made,
-    given the prior and what the misfit says of it.
+    region: which errors may go together, (R,) int. Where parts of the tissue ask for different numbers, differences of
+    the misfit tell less than they say; and that a lens, a slope or a rim fits a little better is no evidence for it:
+    the shape of a simulated motion is not known that well (docs/numbers.md).
     """
-    cost, scale = cost_of(solution.residual, solution.x, wanted), spread_of(solution.residual)
-    odds = [np.exp(min(0.5 * (cost - a.cost) / scale, MOST_ODDS)) if a.one.rival else 0.0 for a in found]
-    weights, result = _weights(solution.residual), []
-    for a, odd in zip(found, odds, strict=True):
-        if a.one.rival:
-            result.append(float(odd / (1.0 + sum(odds))))
-        elif a.residual is None or not a.one.told:
-            result.append(1.0)
-        else:
-            result.append(_mean_square(weights, solution.residual, a.residual, scale))
-    return result
+    cost, unit = cost_of(solution.residual, solution.x, wanted), _unit(solution, wanted, region)
+    odds = [np.exp(min(0.5 * (cost - a.cost) / unit, MOST_ODDS)) if a.one.rival else 0.0 for a in found]
+    return [float(odd / (1.0 + sum(odds))) if a.one.rival else 1.0 for a, odd in zip(found, odds, strict=True)]
 
 
-def _mean_square(weights: np.ndarray, here: np.ndarray, there: np.ndarray, scale: float) -> float:
-    """Of the step from what was taken for granted to what is true, where this one led from residuals here to there.
-
-    Its prior is a standard deviation of 1, and the misfit along it is taken for a parabola.
-    """
-    apart = there - here
-    precision = 1.0 + float(weights @ apart**2) / scale
-    return (float(weights @ (apart * here)) / scale / precision) ** 2 + 1.0 / precision
+def _unit(solution: Solution, wanted: Search, region: np.ndarray) -> float:
+    """What difference of costs is worth 1."""
+    scale = spread_of(solution.residual)
+    share = INDEPENDENT / scale
+    return scale * overstated(solution.jacobian, solution.residual, share, wanted.spread, region)
 
 
 def _weights(r: np.ndarray) -> np.ndarray:

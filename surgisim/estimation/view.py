@@ -8,6 +8,7 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
 from surgisim.estimation.lay import Columns
 from surgisim.estimation.observation import Filmed
+from surgisim.estimation.search import Search
 
 
 @dataclass(frozen=True)
@@ -39,14 +40,29 @@ class View:
         return nearer[..., None] * [1 / self.lens, 1 / self.lens, 1.0]
 
     def motion(self, found: Motion) -> Motion:
-        """How the instruments carry tissue in this view: each grip's whole path is brought along with its start."""
+        """How the instruments carry tissue in this view: each grip's whole path is brought along with its start.
+
+        A held ball is as large as it was: how large it is, is a number of the fit."""
         factor = self.factor(found.center_rest)
         return replace(
             found,
             center_rest=found.center_rest * factor,
             position=found.position * factor[:, None],
-            radius=found.radius * factor[:, 0],
         )
+
+    def alike(self, x: np.ndarray, wanted: Search) -> np.ndarray:
+        """Numbers, (M,), with which tissue moves in this view much as it did at x: each length is as much shorter as
+        the picture is narrower, and moduli and viscosities go with its square, where density and times are known."""
+        narrower, count = -np.log(self.lens), len(wanted.free)
+        moved = x.copy()
+        for k, (*_, p) in enumerate(wanted.free):
+            moved[k] += 2 * narrower * (p.logarithmic and p.unit in ("Pa", "Pa s"))
+        for k, u in enumerate(wanted.open, count):
+            if u.unit == "m" and u.logarithmic:
+                moved[k] += narrower
+            elif u.name.endswith((".right", ".down")):
+                moved[k] /= self.lens
+        return moved
 
     def observation(self, seen: Filmed) -> Filmed:
         """What is compared in this view; what one standard deviation is in the picture stays."""

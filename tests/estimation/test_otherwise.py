@@ -1,4 +1,4 @@
-"""What is taken for granted counts as much as it bends the numbers, and as little as the clip lets it."""
+"""What is taken for granted counts as much as it bends the numbers, and a rival as much as it is probable."""
 
 from dataclasses import dataclass, replace
 
@@ -7,10 +7,10 @@ import pytest
 
 from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.otherwise import Otherwise, answers, better, shares
-from surgisim.estimation.rounds import INDEPENDENT
 from surgisim.estimation.search import Search, search
 
 COUNT = 4000
+REGION = np.repeat(np.arange(20), COUNT // 20)
 
 
 @dataclass(frozen=True)
@@ -38,22 +38,30 @@ def away(trial, *shift):
     return replace(trial, off=-trial.slope @ np.array(shift))
 
 
-def test_what_bends_numbers_and_leaves_no_misfit_counts_whole():
+def test_what_was_taken_for_granted_counts_whole():
     trial, solution = fitted()
-    [answer] = answers(solution, trial.wanted, [Otherwise("lens", away(trial, 0.3, 0.0, -0.2), told=True)], silent)
-    assert answer.x - solution.x == pytest.approx([0.3, 0.0, -0.2], rel=0.02, abs=1e-3)
-    assert shares(solution, trial.wanted, [answer]) == pytest.approx([1.0], rel=0.02)
-
-
-def test_what_the_clip_speaks_against_counts_less():
-    trial, solution = fitted()
-    other = away(trial, 0.3, 0.0, -0.2)
     noise = np.random.default_rng(1).normal(size=COUNT)
     noise -= trial.slope @ np.linalg.lstsq(trial.slope, noise, rcond=None)[0]
-    [answer] = answers(
-        solution, trial.wanted, [Otherwise("lens", replace(other, off=other.off + noise), told=True)], silent
-    )
-    assert shares(solution, trial.wanted, [answer]) == pytest.approx([1 / (1 + INDEPENDENT * COUNT)], rel=0.1)
+    other = away(trial, 0.3, 0.0, -0.2)
+    for off in (other.off, other.off + noise):
+        [answer] = answers(solution, trial.wanted, [Otherwise("lens", replace(other, off=off))], silent)
+        assert answer.x - solution.x == pytest.approx([0.3, 0.0, -0.2], rel=0.02, abs=1e-3)
+        assert shares(solution, trial.wanted, [answer], REGION) == [1.0]
+
+
+def test_a_misfit_says_less_of_rivals_where_regions_pull_the_numbers_apart():
+    trial, _ = fitted()
+    noise = np.random.default_rng(3).normal(size=COUNT)
+    noise -= trial.slope @ np.linalg.lstsq(trial.slope, noise, rcond=None)[0]
+    apart = np.repeat(np.random.default_rng(4).normal(size=20), COUNT // 20)[:, None] * trial.slope
+    apart = 5 * apart.sum(1) / np.abs(apart.sum(1)).mean()
+    apart -= trial.slope @ np.linalg.lstsq(trial.slope, apart, rcond=None)[0]
+    share = {}
+    for name, off in (("agreeing", noise * np.sqrt(np.mean(apart**2))), ("apart", apart)):
+        solution = Solution(trial.wanted.start, off, trial.slope)
+        rival = Otherwise("rival", replace(trial, off=1.05 * off), rival=True)
+        [share[name]] = shares(solution, trial.wanted, answers(solution, trial.wanted, [rival], silent), REGION)
+    assert share["agreeing"] < share["apart"] < 0.5
 
 
 def test_rivals_share_by_how_well_they_fit():
@@ -69,7 +77,7 @@ def test_rivals_share_by_how_well_they_fit():
         ],
         silent,
     )  # fmt: skip
-    as_good, poor = shares(solution, trial.wanted, found)
+    as_good, poor = shares(solution, trial.wanted, found, REGION)
     assert as_good == pytest.approx(0.5, abs=0.02)
     assert poor < 1e-6
 
@@ -87,9 +95,9 @@ def test_a_fit_gives_way_to_a_far_more_probable_one_only():
     off = np.random.default_rng(2).normal(size=COUNT)
     worse = Solution(trial.wanted.start, 1.5 * off, trial.slope)
     changed = [Otherwise("edge", replace(trial, off=off), rival=True)]
-    assert better(worse, trial.wanted, answers(worse, trial.wanted, changed, silent)).one is changed[0]
+    assert better(worse, trial.wanted, answers(worse, trial.wanted, changed, silent), REGION).one is changed[0]
     same = Solution(trial.wanted.start, off, trial.slope)
-    assert better(same, trial.wanted, answers(same, trial.wanted, changed, silent)) is None
+    assert better(same, trial.wanted, answers(same, trial.wanted, changed, silent), REGION) is None
 
 
 def silent(*_):

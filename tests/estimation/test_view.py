@@ -1,5 +1,7 @@
 """Another lens or another shape leaves every pixel where it was."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import sparse
@@ -8,6 +10,8 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
 from surgisim.estimation.lay import Columns
 from surgisim.estimation.observation import Filmed
+from surgisim.estimation.search import search
+from surgisim.estimation.unknown import Unknown
 from surgisim.estimation.view import View
 
 CAMERA = Camera(64, 48, 80.0, 80.0, 31.5, 23.5, 25.0, 6, "arbitrary", "assumed", "clip", [64, 48], [0, 0, 64, 48])
@@ -72,3 +76,14 @@ def test_a_longer_lens_makes_a_narrower_body_as_deep():
     assert seen.area == pytest.approx(laid.area / 1.25**2)
     assert seen.begin - seen.above == pytest.approx(laid.begin - laid.above)
     assert seen.thickness == laid.thickness
+
+
+def test_a_longer_lens_asks_for_shorter_lengths_and_softer_tissue():
+    depth = Unknown("held.depth", 0.0, 0.6, -1.0, 1.0, "m", True, 0.02)
+    wanted = replace(search(["corotated", "newtonian"], {}, []), depth=depth)
+    x = view(lens=1.3).alike(wanted.start, wanted) - wanted.start
+    moved = dict(zip(wanted.names, x, strict=True))
+    assert moved["held.depth"] == pytest.approx(-np.log(1.3))
+    assert moved["corotated.E"] == pytest.approx(-2 * np.log(1.3))
+    assert moved["newtonian.eta"] == pytest.approx(-2 * np.log(1.3))
+    assert moved["corotated.nu"] == 0
