@@ -51,7 +51,7 @@ def test_a_layer_moves_the_same_whichever_way_it_lies(layer):
 def test_a_planted_pull_is_found_along_the_view(lattice, layer, pull):
     rest, watched, change = _pulled(lattice, layer, np.array(pull))
     found = nearer(lattice, rest, watched)
-    assert np.sqrt(((found - change) ** 2).sum() / (change**2).sum()) < 0.3
+    assert np.sqrt(((found - change) ** 2).sum() / (change**2).sum()) < 0.15
 
 
 def test_where_nothing_moves_nothing_comes_nearer(lattice, layer):

@@ -62,7 +62,7 @@ def estimate(
 
     rgb: sRGB, (T, H, W, 3) uint8. hidden: pixels whose colour is not the tissue's at that time, specular: highlights,
     (T, H, W) bool. distance: median depth of frame 0 [m]. size: longer side of the lattice it is solved on [px].
-    relief: expected spread of log depth in frame 0.
+    relief: expected spread of log depth in frame 0 about its mean slope.
     """
     ratio = min(1.0, size / max(rgb.shape[1:3]))
     lattice = Lattice.of(camera, ratio)
@@ -178,7 +178,7 @@ def _first(
 
 
 def _plane(lattice: Lattice, log_z: np.ndarray) -> np.ndarray:
-    """The slope that the whole of log depth has, about 0, (h, w): how a view looks at tissue is not held to flat."""
+    """The mean slope of log depth as a plane about 0, (h, w): tissue may lie slanted to the view."""
     flat = np.concatenate([lattice.ray.reshape(-1, 2), np.ones((log_z.size, 1))], -1)
     plane = (flat @ np.linalg.lstsq(flat, log_z.ravel(), rcond=None)[0]).reshape(log_z.shape)
     return plane - np.median(plane)
