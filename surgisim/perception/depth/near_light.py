@@ -70,21 +70,21 @@ def estimate(
     rest = _first(lattice, light, hue, known, relief)
     rest += np.log(distance) - np.median(rest[known > 0.5] if (known > 0.5).any() else rest)
     albedo = light + shading(lattice, rest)
-    looks, watched, alone = [], [], rest - np.median(rest)
-    origin = lattice.pixels
+    frames, watched, alone = [], [], rest - np.median(rest)
     for t, warp in enumerate(follow_surface(rgb, hidden)):
         now = _read(rgb[t], hidden[t] | specular[t], lattice.shape)
         alone = _first(lattice, *now, relief, begin=alone, turns=1) if t else alone
         position, sure = _placed(warp, lattice)
-        look = _look(lattice, position, sure, now, alone, rest, albedo, origin, ratio * camera.fx)
-        origin = look.origin
-        looks.append(look)
+        frames.append((sure, now, alone))
         watched.append(_watch(lattice, position, sure, now))
         if progress:
             progress(t + 1, 2 * len(rgb), "light along the tissue's way")
-    z, confidence = [], []
-    changes = nearer(lattice, rest, Watched(*map(np.stack, zip(*watched, strict=True))))
-    for t, (look, change) in enumerate(zip(looks, changes, strict=True)):
+    z, confidence, origin = [], [], lattice.pixels
+    changes, places = nearer(lattice, rest, Watched(*map(np.stack, zip(*watched, strict=True))))
+    for t, (frame, change, place) in enumerate(zip(frames, changes, places, strict=True)):
+        position = (place.reshape(lattice.ray.shape) - lattice.ray[0, 0]) / (lattice.ray[1, 1] - lattice.ray[0, 0])
+        look = _look(lattice, position, *frame, rest, albedo, origin, ratio * camera.fx)
+        origin = look.origin
         log_z = look.start + _at(change, look.origin)
         misfit = np.where(look.weight > 0, look.light + shading(lattice, log_z), 0.0)
         z.append(_grow(np.exp(log_z), rgb.shape[1:3]))

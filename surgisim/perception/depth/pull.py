@@ -86,23 +86,25 @@ class _Scene:
     weight_light: np.ndarray
 
 
-def nearer(lattice: Lattice, rest: np.ndarray, watched: Watched) -> np.ndarray:
-    """Change of log depth of frame 0's tissue by a pull, (T, h, w); 0 where nothing is seen to move.
+def nearer(lattice: Lattice, rest: np.ndarray, watched: Watched) -> tuple[np.ndarray, np.ndarray]:
+    """Change of log depth of frame 0's tissue by a pull, (T, h, w), 0 where nothing is seen to move; and its place.
 
+    The place is X and Y of (X, Y, 1), (T, K, 2): as seen where that is sure, else as the layer has it.
     rest: log depth in frame 0, (h, w).
     """
     scale = np.median(rest)
     z = np.exp(rest - scale).ravel()
     tissue = np.concatenate([watched.ray[0], np.ones((len(z), 1))], -1) * z[:, None]
     across = watched.ray * z[:, None] - tissue[:, :2]
-    across = across - _everywhere(across)
+    everywhere = _everywhere(across)
+    across = across - everywhere
     pixel = 2 / np.abs(lattice.along_x).sum(1).max()
     pattern, course, sure = _shared(across, np.where(watched.sure > CLEAR, watched.sure, 0.0) ** 2)
     size = np.linalg.norm(pattern, axis=-1) * sure
     largest = np.percentile(size, 99.5)
     change = np.zeros((len(course), *lattice.shape))
     if largest < VISIBLE * pixel:
-        return change
+        return change, watched.ray
     lit = watched.lit * watched.lit[0] * watched.sure
     brighter = _without_gain(watched.light - watched.light[0], lit, np.linalg.norm(across, axis=-1) < pixel / 2)
     around = _smooth(size, sure, lattice.shape)
@@ -121,6 +123,7 @@ def nearer(lattice: Lattice, rest: np.ndarray, watched: Watched) -> np.ndarray:
         lit[full].mean(0) * lively,
     )
     best = _fitted(scene, tissue[np.argmax(around), :2], pattern)
+    place = watched.ray.copy()
     for t, share in enumerate(course):
         now = replace(
             scene,
@@ -130,8 +133,11 @@ def nearer(lattice: Lattice, rest: np.ndarray, watched: Watched) -> np.ndarray:
             weight_across=np.where(watched.sure[t] > CLEAR, watched.sure[t], 0.0) / noise,
             weight_light=lit[t] * lively,
         )
-        change[t] = np.log1p(np.maximum(_along(now, best, share) / z, -0.8)).reshape(lattice.shape)
-    return change
+        moved, explained = _moved(now, best, share)
+        change[t] = np.log1p(np.maximum(explained * moved[:, 2] / z, -0.8)).reshape(lattice.shape)
+        layer = (tissue + moved)[:, :2] / (tissue + moved)[:, 2:] + everywhere[t] / z[:, None]
+        place[t] += explained * (1 - watched.sure[t])[:, None] * (layer - place[t])
+    return change, place
 
 
 def _everywhere(across: np.ndarray) -> np.ndarray:
@@ -186,11 +192,11 @@ def _fitted(scene: _Scene, center: np.ndarray, pattern: np.ndarray) -> np.ndarra
     return min(best, key=lambda found: found[0])[1]
 
 
-def _along(scene: _Scene, best: np.ndarray, share: float) -> np.ndarray:
-    """Displacement of the tissue along the view in one frame, (K,), with all but the pull kept.
+def _moved(scene: _Scene, best: np.ndarray, share: float) -> tuple[np.ndarray, float]:
+    """Displacement of the tissue in one frame, (K, 3), with all but the pull kept, and how far to believe it, 0-1.
 
-    It is believed where the layer explains at least half of the motion across the view (its square), and less and less
-    where it does not, as when the camera moves.
+    Wholly where the layer explains at least half of the motion across the view (its square), and less and less where it
+    does not, as when the camera moves.
     """
     tissue, unit = _body(scene, best)
     whole = best[4:7]
@@ -203,7 +209,7 @@ def _along(scene: _Scene, best: np.ndarray, share: float) -> np.ndarray:
     moved = unit @ _least_squares(misfit, share * whole, STEPS[4:7])[1]
     left = scene.weight_across * np.linalg.norm(_across(scene, moved), axis=-1)
     seen = scene.weight_across * np.linalg.norm(scene.across, axis=-1)
-    return moved[:, 2] * np.clip(2 - 2 * (left @ left) / max(seen @ seen, 1e-12), 0.0, 1.0)
+    return moved, float(np.clip(2 - 2 * (left @ left) / max(seen @ seen, 1e-12), 0.0, 1.0))
 
 
 def _body(scene: _Scene, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
