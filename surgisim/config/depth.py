@@ -14,7 +14,7 @@ class Depth(Settings):
     distance: Annotated[float, Field(gt=0)] = 0.07
     """Median depth of frame 0, where the recording cannot tell the absolute size [m]."""
     relief: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """near_light: expected spread of depth in frame 0, as a share of the distance [1]."""
+    """near_light: expected spread of depth in frame 0 about its mean slope, as a share of the distance [1]."""
     lattice: Annotated[int, Field(ge=16, le=320)] = 64
     """near_light: longer side of the grid that depth is solved on [px]."""
     range: Annotated[float, Field(gt=1)] = 2.0

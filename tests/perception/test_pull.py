@@ -1,0 +1,103 @@
+"""Depth's change of pulled tissue, on soft layers whose pull is planted."""
+
+import numpy as np
+import pytest
+from pulled_sheet import camera
+
+from surgisim.lighting.headlight import log_brightness_change
+from surgisim.perception.depth.pull import Watched, nearer
+from surgisim.perception.depth.shading import Lattice
+from surgisim.perception.depth.soft_layer import SoftLayer
+
+COURSE = np.array([0.0, 0.0, 0.3, 0.7, 1.0, 1.0, 0.1])
+"""Share of the pull in every frame."""
+
+
+@pytest.fixture(scope="module")
+def layer() -> SoftLayer:
+    return SoftLayer.solved()
+
+
+@pytest.fixture(scope="module")
+def lattice() -> Lattice:
+    return Lattice.of(camera(64, 48, len(COURSE)), 1.0)
+
+
+def test_held_tissue_goes_where_it_is_carried(layer):
+    inside = np.array([[0.0, 0.0], [0.5, 0.5], [-0.75, 0.0]])
+    assert np.allclose(layer.carried(inside, 2.0), np.eye(3), atol=1e-5)
+
+
+def test_a_pull_reaches_farther_along_the_layer_than_out_of_it(layer):
+    along, _, out = np.einsum("kii->ik", layer.carried(np.array([[2.0, 0.0], [4.0, 0.0]]), 2.0))
+    assert 0.2 < along[0] < 0.7 > 2 * out[0]
+    assert np.abs([along[1], out[1]]).max() < 0.15
+
+
+def test_tissue_bulges_before_a_pull_and_sinks_behind_it(layer):
+    before, behind = layer.carried(np.array([[1.75, 0.0], [-1.75, 0.0]]), 2.0)[:, 2, 0]
+    assert before > 0.05
+    assert np.isclose(before, -behind, atol=0.01)
+
+
+def test_a_layer_moves_the_same_whichever_way_it_lies(layer):
+    at = np.array([[1.5, 0.5]])
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    turned = layer.carried(at @ turn[:2, :2].T, 3.0)[0]
+    assert np.allclose(turned, turn @ layer.carried(at, 3.0)[0] @ turn.T, atol=1e-4)
+
+
+@pytest.mark.parametrize("pull", [(0.09, -0.03, 0.06), (-0.06, 0.02, 0.10), (0.0, 0.08, 0.01)])
+def test_a_planted_pull_is_found_along_the_view(lattice, layer, pull):
+    rest, watched, change = _pulled(lattice, layer, np.array(pull))
+    found, _ = nearer(lattice, rest, watched)
+    assert np.sqrt(((found - change) ** 2).sum() / (change**2).sum()) < 0.15
+
+
+def test_where_nothing_moves_nothing_comes_nearer(lattice, layer):
+    rest, watched, _ = _pulled(lattice, layer, np.zeros(3))
+    assert not nearer(lattice, rest, watched)[0].any()
+
+
+def test_a_view_that_slides_as_a_whole_brings_nothing_nearer(lattice, layer):
+    rest, watched, _ = _pulled(lattice, layer, np.zeros(3))
+    slid = watched.ray + 0.1 * COURSE[:, None, None]
+    assert np.abs(nearer(lattice, rest, Watched(slid, watched.sure, watched.light, watched.lit))[0]).max() < 0.02
+
+
+def _pulled(lattice: Lattice, layer: SoftLayer, pull: np.ndarray) -> tuple[np.ndarray, Watched, np.ndarray]:
+    """Log depth at rest, what is seen of a slanted layer, and how its log depth changes, (T, h, w).
+
+    pull: along the layer twice and out of it, over the distance.
+    """
+    slope = np.array([0.1, -0.3])
+    ray = np.concatenate([lattice.ray.reshape(-1, 2), np.ones((lattice.pixels[..., 0].size, 1))], -1)
+    tissue = ray / (ray @ [-slope[0], -slope[1], 1.0])[:, None]
+    out = np.array([*slope, -1.0]) / np.sqrt(1 + slope @ slope)
+    right = np.array([1.0, 0.0, slope[0]]) / np.hypot(1, slope[0])
+    axes = np.stack([right, np.cross(out, right), out])
+    at = (tissue - [0.05, -0.03, 1 + slope @ [0.05, -0.03]]) @ axes[:2].T / 0.06
+    unit = axes.T @ layer.carried(at, 2.5)
+    moved = tissue + np.einsum("t,kij,j->tki", COURSE, unit, pull)
+    rng = np.random.default_rng(0)
+    normals = [_normals(points, lattice.shape) for points in (tissue, *moved)]
+    light = [
+        log_brightness_change(tissue, normals[0], points, normal, ambient=0.05)
+        for points, normal in zip(moved, normals[1:], strict=True)
+    ]
+    seen = moved[..., :2] / moved[..., 2:] + 2e-4 * rng.standard_normal((*moved.shape[:2], 2))
+    light = np.stack(light) + 0.02 * rng.standard_normal(moved.shape[:2])
+    known = np.ones(moved.shape[:2])
+    shape = len(COURSE), *lattice.shape
+    rest = np.log(tissue[:, 2])
+    return (
+        rest.reshape(lattice.shape),
+        Watched(seen, known, light, known),
+        (np.log(moved[..., 2]) - rest).reshape(shape),
+    )
+
+
+def _normals(points: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Toward the camera, of a grid of points (K, 3)."""
+    grid = points.reshape(*shape, 3)
+    return np.cross(np.gradient(grid, axis=0), np.gradient(grid, axis=1)).reshape(-1, 3)
