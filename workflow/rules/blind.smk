@@ -303,7 +303,9 @@ rule pooled:
     resources:
         mem_mb=1000,
     params:
-        settings=lambda w: json.dumps({"pages": "../{seed}/{case}/main/diagnosis.html"}),
+        settings=lambda w: json.dumps(
+            {"pages": f"../{room('{seed}')}/{{case}}/main/diagnosis.html"}
+        ),
         code=code("pooled"),
     shell:
         'python "$SURGISIM/stages/pooled.py" --boards {input.boards}'
