@@ -33,10 +33,8 @@ SEEN = 0.6
 """Share of a stretch in which a point must be seen to tell of the noise there."""
 MOST_RUNS = 400
 """Likelihoods computed at most for a fit."""
-LEAST_STEPS = 60
-"""Steps between still frames from which they say how noise is shared by the axes."""
-TRUSTED, MOST_WRONG = 0.7, 10.0
-"""How far (share of a logarithm) they are followed, and the largest factor between axes that they are taken at."""
+SMOOTH, LASTS = 0.012, 0.95
+"""Distance [m] over which errors that still frames do not show are alike, and their correlation from frame to frame."""
 FILLINGS = 3
 """How often missing samples are drawn anew and the numbers fitted again, where samples are missing."""
 
@@ -78,6 +76,14 @@ class Noise:
         """RMS error along an axis [m]."""
         total = self.shared + self.rigid + self.tilt + self.lasting + self.white
         return float(np.sqrt((self.level**2).mean() * total))
+
+    def at_least(self, nominal: np.ndarray) -> "Noise":
+        """With errors of at least these [m], (K,): what still frames do not show is shared by neighbours and lasts."""
+        missing = float((nominal**2).mean() - self.sigma**2) / float((self.level**2).mean())
+        if missing <= 0:
+            return self
+        length, keep = max(self.length, SMOOTH), max(self.keep_shared, LASTS)
+        return replace(self, shared=self.shared + missing, length=length, keep_shared=keep)
 
     def modes(self, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Patterns over the points, (K, K), orthonormal columns, and each one's shared and camera variance, (K,)."""
@@ -189,12 +195,13 @@ def estimate(
     """From displacements [m], (K, T, 3), where `seen`, (K, T), on frames that are `still`, (T,) bool.
 
     nominal: what the recording says of each point's noise [m], (K,); it decides where nothing can be estimated.
-    axes: what it says of the three axes' shares of it [1], (K, 3), None if alike; corrected by what still frames show.
+    axes: what it says of the three axes' shares of it [1], (K, 3), None if alike. Where it does, `nominal` counts what
+    is wrong with a point that moves, too, and errors are not taken to be smaller (`Noise.at_least`).
     Missing samples of a stretch are drawn from what the seen ones leave open, and the numbers fitted again.
     """
     if axes is not None:
-        axes = _corrected(axes, moved, seen, still)
-        return replace(estimate(moved / axes[:, None], seen, rest, still, nominal), axes=axes)
+        found = estimate(moved / axes[:, None], seen, rest, still, nominal)
+        return replace(found.at_least(nominal), axes=axes)
     level = np.maximum(_levels(moved, seen, nominal), 1e-9)
     rng = np.random.default_rng(0)
     most = MOST_POINTS if seen[:, still].all() else FEWER
@@ -335,16 +342,6 @@ def _levels(moved, seen, nominal) -> np.ndarray:
     known = nominal[np.isfinite(nominal) & (nominal > 0)]
     unit = float(np.median(known)) if len(known) else 1.5 * middle
     return unit * share
-
-
-def _corrected(axes: np.ndarray, moved: np.ndarray, seen: np.ndarray, still: np.ndarray) -> np.ndarray:
-    """Shares of the axes [1], (K, 3), drawn towards what successive still frames show of all points, RMS 1 for each."""
-    both = seen[:, 1:] & seen[:, :-1] & still[1:] & still[:-1]
-    size = np.median(np.abs(np.diff(moved / axes[:, None], axis=1)[both]), axis=0) if both.sum() > LEAST_STEPS else 0.0
-    if not np.all(size > 0):
-        return axes
-    axes = axes * np.clip(size / np.exp(np.log(size).mean()), 1 / MOST_WRONG, MOST_WRONG) ** TRUSTED
-    return axes / np.sqrt((axes**2).mean(1, keepdims=True))
 
 
 def _stretches(still: np.ndarray) -> list[np.ndarray]:
