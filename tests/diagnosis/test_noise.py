@@ -49,19 +49,19 @@ def test_depth_that_is_less_sure_weighs_less(drawn):
 
 
 def test_errors_that_still_frames_do_not_show_are_at_least_as_large_as_said(drawn):
-    rest, noise, *_ = drawn
-    axes, seen = np.tile(AXES, (50, 1)), np.ones((50, FRAMES), bool)
+    rest, noise = drawn[0][:20], drawn[1].of(np.arange(20))
+    axes, seen = np.tile(AXES, (20, 1)), np.ones((20, FRAMES), bool)
     tracks = replace(noise, axes=axes).draw(rest, FRAMES, np.random.default_rng(7))
     told = (tracks, seen, rest, np.ones(FRAMES, bool))
-    quiet, loud = (estimate(*told, np.full(50, sigma), axes) for sigma in (2e-5, 3e-3))
-    assert quiet.sigma == pytest.approx(noise.sigma, rel=0.15)
+    quiet, loud = (estimate(*told, np.full(20, sigma), axes) for sigma in (2e-5, 3e-3))
+    assert quiet.sigma == pytest.approx(noise.sigma, rel=0.3)
     assert loud.sigma == pytest.approx(3e-3)
     assert (loud.keep_shared, loud.length) >= (0.95, 0.012)
     # A smooth change as large as that is nothing then; without axes, frames at rest have the word.
     bent = 3e-3 * np.exp(-(((rest[:, :1] - 0.02) / 0.015) ** 2))[..., None] * np.linspace(0, 1, FRAMES)[:, None] * AXES
     beyond = [(whitener(n, rest, seen)(bent) ** 2).sum() for n in (loud, quiet)]
     assert beyond[0] < 200 < 2000 < beyond[1]
-    assert estimate(*told, np.full(50, 3e-3)).sigma < 1e-3
+    assert estimate(*told, np.full(20, 3e-3)).sigma < 1e-3
 
 
 def test_a_constant_of_a_point_is_no_residual(drawn):
