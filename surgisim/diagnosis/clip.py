@@ -71,6 +71,12 @@ class Clip:
         return self.recording.fps
 
     @property
+    def nominal(self) -> tuple[np.ndarray, np.ndarray | None]:
+        """What the recording says of each point's noise [m], (K,), and of the axes' shares of it, (K, 3) or None."""
+        axes = self.recording.axes
+        return self.recording.sigma[self.kept], None if axes is None else axes[self.kept]
+
+    @property
     def motion(self) -> Motion:
         return self.recording.motion
 

@@ -218,9 +218,7 @@ def prepare_case(
     """
     until = clip.until
     fitted = slice(0, until)
-    noise = estimate(
-        clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, clip.quiet()[fitted], clip.recording.sigma[clip.kept]
-    )
+    noise = estimate(clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, clip.quiet()[fitted], *clip.nominal)
     if settings.noise == "independent":
         noise = replace(
             noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0

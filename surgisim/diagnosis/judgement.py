@@ -347,7 +347,7 @@ def noise_beside(case: Case, after: np.ndarray) -> Noise:
     clip, quiet = case.clip, slice(0, case.clip.until)
     return estimate(
         residual(case, after, False)[:, quiet], clip.seen[:, quiet], clip.rest, clip.quiet()[quiet],
-        clip.recording.sigma[clip.kept],
+        *clip.nominal,
     )  # fmt: skip
 
 

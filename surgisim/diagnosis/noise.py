@@ -2,14 +2,15 @@
 
 An axis of the error of point k at frame t is modelled as
 
-    d_k [ shared(x, t) + camera(x, t) + lasting_k(t) + white_k(t) ]
+    d_k a_k [ shared(x, t) + camera(x, t) + lasting_k(t) + white_k(t) ]
 
-shared: c exp(-|x - x'|^2 / 2 l^2), in time rho^|t - t'|; camera: a constant and a gradient over the tissue, which shake
-from frame to frame, in time s^|t - t'|; lasting: a r^|t - t'|; white: b. The numbers are those of largest restricted
-likelihood on frames in which the tissue is still, each stretch less its own polynomial in time, so that what physics
-moves slowly is not counted as noise (Patterson and Thompson, Recovery of inter-block information when block sizes are
-unequal, Biometrika 58, 1971). Patterns over the points (constant, gradients, then the eigenvectors of what is shared)
-are each a time series of their own, which a Cholesky factor whitens.
+a_k: that axis over all three of the point, 1 where they are alike; of a clip depth is less sure than what lies across
+the view. shared: c exp(-|x - x'|^2 / 2 l^2), in time rho^|t - t'|; camera: a constant and a gradient over the tissue,
+which shake from frame to frame, in time s^|t - t'|; lasting: a r^|t - t'|; white: b. The numbers are those of largest
+restricted likelihood on frames in which the tissue is still, each stretch less its own polynomial in time, so that what
+physics moves slowly is not counted as noise (Patterson and Thompson, Recovery of inter-block information when block
+sizes are unequal, Biometrika 58, 1971). Patterns over the points (constant, gradients, then the eigenvectors of what is
+shared) are each a time series of their own, which a Cholesky factor whitens.
 
 What is not seen has no value: every sample that is missing is a direction of infinite variance, and so is each point's
 constant. Projecting those out of the whitened vectors is the exact marginal likelihood of the samples that are there.
@@ -32,6 +33,8 @@ SEEN = 0.6
 """Share of a stretch in which a point must be seen to tell of the noise there."""
 MOST_RUNS = 400
 """Likelihoods computed at most for a fit."""
+SMOOTH, LASTS = 0.012, 0.95
+"""Distance [m] over which errors that still frames do not show are alike, and their correlation from frame to frame."""
 FILLINGS = 3
 """How often missing samples are drawn anew and the numbers fitted again, where samples are missing."""
 
@@ -56,12 +59,31 @@ class Noise:
     keep: float
     """r"""
     white: float
+    axes: np.ndarray | None = None
+    """a_k of every axis [1], (K, 3), of RMS 1 for each point; None where all are alike."""
+
+    @property
+    def scale(self) -> np.ndarray:
+        """d_k a_k [m], (K, 3)."""
+        return self.level[:, None] * (np.ones((1, 3)) if self.axes is None else self.axes)
+
+    def of(self, mine: np.ndarray) -> "Noise":
+        """That of some of the points, as (M,) or (K,) bool chooses them."""
+        return replace(self, level=self.level[mine], axes=None if self.axes is None else self.axes[mine])
 
     @property
     def sigma(self) -> float:
         """RMS error along an axis [m]."""
         total = self.shared + self.rigid + self.tilt + self.lasting + self.white
         return float(np.sqrt((self.level**2).mean() * total))
+
+    def at_least(self, nominal: np.ndarray) -> "Noise":
+        """With errors of at least these [m], (K,): what still frames do not show is shared by neighbours and lasts."""
+        missing = float((nominal**2).mean() - self.sigma**2) / float((self.level**2).mean())
+        if missing <= 0:
+            return self
+        length, keep = max(self.length, SMOOTH), max(self.keep_shared, LASTS)
+        return replace(self, shared=self.shared + missing, length=length, keep_shared=keep)
 
     def modes(self, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Patterns over the points, (K, K), orthonormal columns, and each one's shared and camera variance, (K,)."""
@@ -78,7 +100,7 @@ class Noise:
         axes, shared, camera = self.modes(rest)
         factor = np.linalg.cholesky(self.temporal(frames, shared, camera))
         mode = np.einsum("mts,msc->mtc", factor, rng.standard_normal((len(rest), frames, 3)))
-        return self.level[:, None, None] * np.einsum("km,mtc->ktc", axes, mode)
+        return self.scale[:, None] * np.einsum("km,mtc->ktc", axes, mode)
 
 
 @dataclass(frozen=True)
@@ -89,6 +111,7 @@ class Whitener:
     """
 
     scale: np.ndarray
+    """One over the noise of each axis [1/m], (K, 3)."""
     axes: np.ndarray
     inverse: np.ndarray
     """Inverse Cholesky factors, (M, T, T)."""
@@ -102,7 +125,7 @@ class Whitener:
     def __call__(self, field: np.ndarray) -> np.ndarray:
         """Of fields [m], (..., K, T, 3), as (..., K T 3), in their own precision."""
         kind = np.float32 if field.dtype == np.float32 else float
-        scaled = field * (self.mask * self.scale[:, None])[..., None].astype(kind)
+        scaled = field * (self.mask[..., None] * self.scale[:, None]).astype(kind)
         mode = np.tensordot(self.axes.T.astype(kind), np.moveaxis(scaled, -3, 0), (1, 0))
         shape = mode.shape
         mode = np.moveaxis(mode, -2, 1).reshape(shape[0], shape[-2], int(np.prod(shape[1:-2])) * shape[-1])
@@ -115,7 +138,7 @@ class Whitener:
         """The transpose: of numbers (K T 3,), as (K, T, 3)."""
         mode = self._known(white.reshape(len(self.scale), -1, 3).astype(float))
         mode = np.swapaxes(self.inverse, 1, 2) @ mode
-        return np.tensordot(self.axes, mode, (1, 0)) * (self.mask * self.scale[:, None])[..., None]
+        return np.tensordot(self.axes, mode, (1, 0)) * self.mask[..., None] * self.scale[:, None]
 
     def known(self, white: np.ndarray) -> np.ndarray:
         """Numbers (K T 3, C) less what a constant of each point and unseen samples could be."""
@@ -146,7 +169,7 @@ def whitener(noise: Noise, rest: np.ndarray, seen: np.ndarray, offsets: bool = T
     still = inverse.sum(-1)
     still = still / np.linalg.norm(still, axis=1, keepdims=True) * offsets
     none = np.zeros((seen.size, 0), np.float32)
-    plain = Whitener(1 / noise.level, axes, inverse, still, seen.astype(float), none)
+    plain = Whitener(1 / noise.scale, axes, inverse, still, seen.astype(float), none)
     return replace(plain, lost=_lost(plain, ~seen))
 
 
@@ -165,12 +188,20 @@ def _lost(plain: Whitener, unseen: np.ndarray) -> np.ndarray:
     return (columns @ (vectors[:, kept] / np.sqrt(values[kept]))).astype(np.float32)
 
 
-def estimate(moved: np.ndarray, seen: np.ndarray, rest: np.ndarray, still: np.ndarray, nominal: np.ndarray) -> Noise:
+def estimate(
+    moved: np.ndarray, seen: np.ndarray, rest: np.ndarray, still: np.ndarray, nominal: np.ndarray,
+    axes: np.ndarray | None = None,
+) -> Noise:  # fmt: skip
     """From displacements [m], (K, T, 3), where `seen`, (K, T), on frames that are `still`, (T,) bool.
 
     nominal: what the recording says of each point's noise [m], (K,); it decides where nothing can be estimated.
+    axes: what it says of the three axes' shares of it [1], (K, 3), None if alike. Where it does, `nominal` counts what
+    is wrong with a point that moves, too, and errors are not taken to be smaller (`Noise.at_least`).
     Missing samples of a stretch are drawn from what the seen ones leave open, and the numbers fitted again.
     """
+    if axes is not None:
+        found = estimate(moved / axes[:, None], seen, rest, still, nominal)
+        return replace(found.at_least(nominal), axes=axes)
     level = np.maximum(_levels(moved, seen, nominal), 1e-9)
     rng = np.random.default_rng(0)
     most = MOST_POINTS if seen[:, still].all() else FEWER

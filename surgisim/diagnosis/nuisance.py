@@ -206,7 +206,7 @@ def drift_of(clip: Clip, noise: Noise, offsets: bool) -> np.ndarray:
     if rest >= LEAST_REST:
         seen = clip.seen[:, :rest]
         mine = seen.any(1)
-        whiten = whitener(replace(noise, level=noise.level[mine]), clip.rest[mine], seen[mine], offsets)
+        whiten = whitener(noise.of(mine), clip.rest[mine], seen[mine], offsets)
         z = whiten(clip.moved[mine, :rest])
         U = whiten(drifting(clip, np.ones(len(PARTS)), rest).columns[:, mine]).T
         gram, shadow = U.T @ U, U.T @ z

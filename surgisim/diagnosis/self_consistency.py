@@ -23,5 +23,5 @@ def drawn(case: Case, rng: np.random.Generator) -> np.ndarray:
     share = np.minimum(near, 1.0) * rng.standard_normal(len(base.slopes))
     moved[:, : clip.until] += np.tensordot(share, base.slopes, (0, 0))
     if case.settings.offsets:
-        moved = moved + case.noise.level[:, None, None] * rng.standard_normal((len(clip.rest), 1, 3))
+        moved = moved + case.noise.scale[:, None] * rng.standard_normal((len(clip.rest), 1, 3))
     return moved

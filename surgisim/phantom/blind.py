@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surgisim.config.invent import Invent
+from surgisim.config.invent import Concealing, Invent
 from surgisim.phantom import folder, nuisance
 from surgisim.phantom.effect import Hidden, catalogue, conceal, described
 from surgisim.phantom.follow import follow
 from surgisim.phantom.mixture import concealed
-from surgisim.phantom.model import model
+from surgisim.phantom.model import Model, model
 from surgisim.phantom.scene import Hold, Scene, draw
 from surgisim.phantom.snr import Found, scaled, signal
 from surgisim.problem import Problem
@@ -70,61 +70,71 @@ def invent(settings: Invent, progress: Progress | None = None, names: tuple[str,
     if settings.lag is not None:
         drawn = drawn.lagging(settings.lag)
     drawn = drawn.between_frames(settings.close_phase, settings.release_phase)
-    scene, (plain, quick) = borne(drawn, spacings, progress)
+    scene, models, (plain, quick) = borne(drawn, spacings, progress)
     free = nuisance.visible(scene, plain, generator(settings, "visible"))
     if names is None:
         names = concealed(settings.seed, settings.case, tuple(settings.only), settings.faint)
-    true, aims = _with_effects(settings, scene, names, plain, quick, free, progress)
+    true, aims, _ = with_effects(settings, models, names, (plain, quick), free, progress)
     rest = scene.shape.upper(scene.probes)
     seen = nuisance.seen(rest, true, settings.noise, generator(settings, "noise"))
     name = name_of(settings.seed, settings.case)
-    body = model(scene, settings.spacing)
-    files = folder.recording(scene, name, seen, free, settings.noise, body, plate=settings.plate)
+    files = folder.recording(scene, name, seen, free, settings.noise, models[0], plate=settings.plate)
     tracks = folder.npz(plain=plain.astype(np.float32), true=true.astype(np.float32))
-    truth = _truth(settings, scene, name, aims, plain, true, free, tracks)
+    truth = told(settings, scene, name, aims, (plain, true), free, tracks)
     return Invented(name, files, (json.dumps(truth, indent=1, allow_nan=False) + "\n").encode(), tracks)
 
 
-def generator(settings: Invent, part: str) -> np.random.Generator:
+def generator(settings: Concealing, part: str) -> np.random.Generator:
     """For one part of one case."""
     return np.random.default_rng([settings.seed, settings.case, *part.encode()])
 
 
-def ratio(settings: Invent, scene: Scene, difference: np.ndarray, free: np.ndarray, *, held_out: bool = False) -> float:
+def ratio(
+    settings: Concealing, scene: Scene, difference: np.ndarray, free: np.ndarray, *, held_out: bool = False
+) -> float:
     """Signal over noise on the frames that are fitted, or on those held out."""
     span = slice(scene.split, None) if held_out else slice(0, scene.split)
     return signal(difference[:, span], free[:, span]) / max(settings.noise, 1e-9)
 
 
 def borne(
-    scene: Scene, spacings: tuple[float, float], progress: Progress | None
-) -> tuple[Scene, tuple[np.ndarray, np.ndarray]]:
-    """The scene, its pulls shortened until they tear nothing, and its paths without effects [m], (K, T, 3).
+    scene: Scene,
+    spacings: tuple[float, float],
+    progress: Progress | None,
+    build: Callable[[Scene, float], Model] = model,
+) -> tuple[Scene, tuple[Model, Model], tuple[np.ndarray, np.ndarray]]:
+    """The scene, its pulls shortened until they tear nothing, its models, and paths without effects [m], (K, T, 3).
 
-    Paths are those in elements of either spacing [m]. Raises Problem where even short pulls tear them.
+    Models and paths are those in elements of either spacing [m], which `build` makes. Raises Problem where even short
+    pulls tear them.
     """
 
-    def paths() -> tuple[np.ndarray, np.ndarray]:
-        fine, quick = (model(scene, spacing) for spacing in spacings)
-        return (
-            follow(fine, progress, "moving the tissue without the effect"),
-            follow(quick, progress, "a quick run without the effect"),
-        )
+    def paths() -> tuple[Scene, tuple[Model, Model], tuple[np.ndarray, np.ndarray]]:
+        fine, coarse = (build(scene, spacing) for spacing in spacings)
+        plain = follow(fine, progress, "moving the tissue without the effect")
+        return scene, (fine, coarse), (plain, follow(coarse, progress, "a quick run without the effect"))
 
     for _ in range(SHORTER):
         try:
-            return scene, paths()
+            return paths()
         except Problem:
             scene = scene.pulled(WEAKER)
-    return scene, paths()
+    return paths()
 
 
-def _with_effects(settings, scene, names, plain, quick, free, progress) -> tuple[np.ndarray, tuple[Aim, ...]]:
-    """Paths with the effects, and the effects. plain, quick: paths without them in fine and in coarse elements."""
+def with_effects(
+    settings: Concealing, models: tuple[Model, Model], names: tuple[str, ...], plain: tuple[np.ndarray, np.ndarray],
+    free: np.ndarray, progress: Progress | None,
+) -> tuple[np.ndarray, tuple[Aim, ...], Model]:  # fmt: skip
+    """Paths with the effects [m], (K, T, 3), the effects, and the model that holds them.
+
+    models, plain: in fine and in coarse elements, the models without effects and their paths [m], (K, T, 3).
+    free: which samples are seen, (K, T). Raises Problem where the tissue does not bear them.
+    """
+    (fine, coarse), (path, quick), scene = models, plain, models[0].scene
     if not names:
-        return plain, ()
+        return path, (), fine
     rng = generator(settings, "effect")
-    coarse = model(scene, settings.spacing_coarse)
 
     def measure(*hidden: Hidden) -> float:
         try:
@@ -144,13 +154,11 @@ def _with_effects(settings, scene, names, plain, quick, free, progress) -> tuple
     def measure_fine(factor: float) -> float:
         hidden = tuple(_times(a.hidden, factor) for a in aims)
         try:
-            true = follow(
-                conceal(model(scene, settings.spacing), hidden), progress, "moving the tissue with the effect"
-            )
+            true = follow(conceal(fine, hidden), progress, "moving the tissue with the effect")
         except Problem:
             return math.inf
         runs[factor] = true, hidden
-        return ratio(settings, scene, true - plain, free)
+        return ratio(settings, scene, true - path, free)
 
     most = max(catalogue()[a.hidden.name].most / a.hidden.magnitude for a in aims)
     found = scaled(measure_fine, wanted, start=1.0, most=most, close=NEAR, tries=FINE_RUNS)
@@ -160,10 +168,11 @@ def _with_effects(settings, scene, names, plain, quick, free, progress) -> tuple
             "fine elements. Take another seed, or a lower snr_high."
         )
     true, hidden = runs[found.magnitude]
-    return true, tuple(Aim(h, a.asked, a.alone) for h, a in zip(hidden, aims, strict=True))
+    aims = tuple(Aim(h, a.asked, a.alone) for h, a in zip(hidden, aims, strict=True))
+    return true, aims, conceal(fine, hidden)
 
 
-def _aim(settings: Invent, scene: Scene, name: str, rng: np.random.Generator, measure) -> Aim:
+def _aim(settings: Concealing, scene: Scene, name: str, rng: np.random.Generator, measure) -> Aim:
     """An effect somewhere, as strong as asked, or as strong as it gets."""
     effect = catalogue()[name]
     share = rng.uniform()
@@ -203,8 +212,12 @@ def _times(hidden: Hidden, factor: float) -> Hidden:
     return hidden.scaled(min(factor * hidden.magnitude, catalogue()[hidden.name].most))
 
 
-def _truth(settings, scene, name, aims, plain, true, free, tracks) -> dict:
-    law, difference = scene.law, true - plain
+def told(
+    settings: Concealing, scene: Scene, name: str, aims: tuple[Aim, ...], paths: tuple[np.ndarray, np.ndarray],
+    free: np.ndarray, tracks: bytes,
+) -> dict:  # fmt: skip
+    """What truth.json says. paths: plain and true [m], (K, T, 3); tracks: what truth.npz holds."""
+    law, difference = scene.law, paths[1] - paths[0]
     kind = "nothing" if not aims else "two" if len(aims) == 2 else "one"
     if any(catalogue()[a.hidden.name].outside for a in aims):
         kind = "outside"

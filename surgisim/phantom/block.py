@@ -66,6 +66,8 @@ class Block:
     """Held still, (N,) bool."""
     gripped: np.ndarray
     """In or on the driven ball, (N,) bool."""
+    upper: np.ndarray
+    """The upper side, (N,) bool."""
     triangles: np.ndarray
     """The upper side and the four sides, outward by the right hand, (F, 3)."""
 
@@ -98,6 +100,7 @@ def mesh(shape: Shape, grip: Grip, spacing: float, *, hold_sides: bool) -> Block
         cells=cells,
         fixed=edge.ravel(),
         gripped=gripped.ravel(),
+        upper=(down == 0).ravel(),
         triangles=_skin(index),
     )
 

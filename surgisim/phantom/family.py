@@ -12,6 +12,7 @@ from surgisim.config.phantom import Phantom
 from surgisim.phantom.block import mesh
 from surgisim.phantom.case import invent
 from surgisim.phantom.elements import elements
+from surgisim.phantom.ogrid import squeezes_none
 from surgisim.problem import Problem
 
 REST, LOAD, HOLD, AFTER = (0.2, 0.5), (0.4, 0.9), (0.5, 1.1), (0.5, 1.0)
@@ -20,6 +21,12 @@ RATES = (15.0, 20.0, 25.0, 30.0, 50.0, 60.0)
 """Frames per second [1/s]."""
 FRAMES = 90
 """Most frames of a clip: a faster camera sees a shorter one."""
+REST_SHOWN, LOAD_SHOWN, HOLD_SHOWN, AFTER_SHOWN = (0.4, 0.7), (0.5, 0.9), (1.0, 1.6), (0.8, 1.3)
+"""The same of a clip that conceals something: every phase long enough to tell laws apart [s]."""
+RATES_SHOWN = (15.0, 20.0, 25.0)
+"""Its frames per second: all phases are seen [1/s]."""
+THICK = (0.012, 0.022)
+"""Its tissue's thickness: a grip fits in coarser elements too [m]."""
 WIDTH, HEIGHT = 160, 128
 """Of the pictures [px]."""
 SPACING = 2.8e-3
@@ -60,15 +67,52 @@ def draw(seed: int, n: int) -> dict[str, Any]:
     return {"phantom": phantom | {"spacing": SPACING}, "ingest": {"focal": phantom["focal"] * WIDTH if told else None}}
 
 
-def _meshed(settings: Phantom) -> bool:
-    """Whether finite elements fit relief and grip: not every pair can be meshed, and another seed has another."""
+def draw_shown(seed: int, n: int, spacings: tuple[float, ...]) -> Phantom:
+    """One clip that may conceal something: the family's camera, tissue and picture, all phases seen, its sides free.
+
+    spacings: edges of the elements that must fit its relief and its grip [m].
+    """
+    camera, _ = _camera(_generator(seed, n, "camera"))
+    thickness = float(_generator(seed, n, "thickness").uniform(*THICK))
+    phantom = {
+        "width": WIDTH,
+        "height": HEIGHT,
+        **camera,
+        **_tissue(_generator(seed, n, "tissue")),
+        **_pull(_generator(seed, n, "pull"), FARTHEST * thickness),
+        **_times_shown(_generator(seed, n, "times")),
+        **_picture(_generator(seed, n, "picture")),
+        **_air(_generator(seed, n, "air")),
+        "dome": _dome(_generator(seed, n, "dome"), thickness),
+        "thickness": thickness,
+        "sides": "free",
+        "spacing": spacings[0],
+    }
+    seeds = _generator(seed, n, "phantom")
+    while True:
+        settings = Phantom(**phantom, seed=int(seeds.integers(1, 2**31)))
+        if all(_meshed(settings, spacing, even=True) for spacing in spacings):
+            return settings
+
+
+def told_focal(seed: int, n: int) -> float | None:
+    """The focal length [px] that the user of the seed's clip `n` knows; None in one clip of two."""
+    camera, told = _camera(_generator(seed, n, "camera"))
+    return camera["focal"] * WIDTH if told else None
+
+
+def _meshed(settings: Phantom, spacing: float = SPACING, *, even: bool = False) -> bool:
+    """Whether finite elements fit relief and grip: not every pair can be meshed, and another seed has another.
+
+    even: whether none of them may be so small as to rule the steps.
+    """
     case = invent(settings)
     try:
-        block = mesh(case.shape, case.grip, SPACING, hold_sides=settings.sides == "held")
+        block = mesh(case.shape, case.grip, spacing, hold_sides=settings.sides == "held")
         elements(block.points, block.cells, case.law)
     except Problem:
         return False
-    return True
+    return not even or squeezes_none(block.points, block.cells, spacing)
 
 
 def _generator(seed: int, n: int, part: str) -> np.random.Generator:
@@ -92,6 +136,16 @@ def _times(rng: np.random.Generator) -> tuple[float, dict[str, float]]:
     begin, arrive, release, end = np.cumsum([rest, load, hold, after]) * short
     times = {"grasp": begin - CLOSED, "load": begin, "hold": arrive, "release": release, "duration": end}
     return fps, {name: float(t) for name, t in times.items()}
+
+
+def _times_shown(rng: np.random.Generator) -> dict[str, float]:
+    """Rest, load, hold, release of whole frames."""
+    fps = float(rng.choice(RATES_SHOWN))
+    spans = [rng.uniform(*ends) for ends in (REST_SHOWN, LOAD_SHOWN, HOLD_SHOWN, AFTER_SHOWN)]
+    begin, arrive, release, end = (np.rint(np.cumsum(spans) * fps) / fps).tolist()
+    return {
+        "fps": fps, "grasp": begin - CLOSED, "load": begin, "hold": arrive, "release": release, "duration": end
+    }  # fmt: skip
 
 
 def _tissue(rng: np.random.Generator) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """A model moved through its scene: leapfrog, as `march`, with whatever an effect adds."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -22,10 +22,17 @@ def follow(model: Model, progress: Progress | None = None, text: str = "moving t
 
     Raises Problem when a position is not finite or an element turns inside out.
     """
-    scene, read = model.scene, _reader(model)
-    x, v = model.mesh.points.copy(), np.zeros_like(model.mesh.points)
-    tracks = np.empty((scene.frames, len(scene.probes), 3))
-    tracks[0] = read(x)
+    read = _reader(model)
+    return np.stack([read(x) for x in nodes(model, progress, text)], 1)
+
+
+def nodes(model: Model, progress: Progress | None = None, text: str = "moving the tissue") -> Iterator[np.ndarray]:
+    """Position of the nodes in every frame [m], T of (N, 3), each valid until the next is asked for.
+
+    Raises Problem when a position is not finite or an element turns inside out.
+    """
+    scene, x, v = model.scene, model.mesh.points.copy(), np.zeros_like(model.mesh.points)
+    yield x
     steps = substeps(model)
     taken: dict[int, np.ndarray] = {}
     for frame in range(1, scene.frames):
@@ -35,10 +42,9 @@ def follow(model: Model, progress: Progress | None = None, text: str = "moving t
                 f"phantom: the elements turned inside out at frame {frame}, with {steps} steps a frame. Pull less "
                 "far, conceal less, or take a finer spacing."
             )
-        tracks[frame] = read(x)
         if progress:
             progress(frame, scene.frames - 1, text)
-    return tracks.swapaxes(0, 1)
+        yield x
 
 
 def substeps(model: Model) -> int:

@@ -73,7 +73,11 @@ class Model:
 
 def model(scene: Scene, spacing: float) -> Model:
     """The scene with nothing concealed, in elements of about `spacing` [m]."""
-    block = mesh(scene.shape, tuple(h.grip for h in scene.holds), spacing)
+    return of_mesh(scene, mesh(scene.shape, tuple(h.grip for h in scene.holds), spacing))
+
+
+def of_mesh(scene: Scene, block: Mesh) -> Model:
+    """The scene with nothing concealed, in these elements."""
     grasp = tuple(lambda t, rest, h=h: np.tile(h.path(t * scene.fps), (len(rest), 1)) for h in scene.holds)
     parts = elements(block.points, block.cells, scene.law)
     return Model(scene, block, parts, Still(np.flatnonzero(block.fixed)), grasp)

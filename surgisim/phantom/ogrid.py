@@ -121,5 +121,13 @@ def even(shape: Shape, grips: tuple[Grip, ...], spacing: float) -> bool:
         block = mesh(shape, grips, spacing)
     except Problem:
         return False
-    share = np.linalg.det(np.einsum("mai,gak->mgik", block.points[block.cells], SLOPES)) / (spacing / 2) ** 3
+    return squeezes_none(block.points, block.cells, spacing)
+
+
+def squeezes_none(points: np.ndarray, cells: np.ndarray, spacing: float) -> bool:
+    """Whether no element, of points [m], (N, 3), and cells, (M, 8), is so small that it rules the steps of all.
+
+    spacing: edge that they were meant to have [m].
+    """
+    share = np.linalg.det(np.einsum("mai,gak->mgik", points[cells], SLOPES)) / (spacing / 2) ** 3
     return bool(share.min() > SQUEEZED)

@@ -35,7 +35,7 @@ def scoreboard(cases: list[Case]) -> dict[str, Any]:
         "seeds": sorted({c["seed"] for c in cases}),
         "kinds": {kind: sum(c["kind"] == kind for c in cases) for kind in ("nothing", "one", "two", "outside")},
         "goals": goals(cases),
-        "figures": {"all": figures(cases), "strong": figures(strong(cases))},
+        "figures": {"all": figures(cases), "strong": figures(strong(cases)), "weaker": figures(weaker(cases))},
         "by_ratio": [_range(cases, low, high) for low, high in itertools.pairwise(RATIOS)],
         "by_phases": [
             {"phases": list(key), **figures([c for c in cases if tuple(c["phases"]) == key])}
@@ -76,6 +76,11 @@ def pooled(boards: list[dict[str, Any]]) -> dict[str, Any]:
 def strong(cases: list[Case]) -> list[Case]:
     """Those with nothing concealed, and those whose effect stands out of the noise."""
     return [c for c in cases if c["kind"] == "nothing" or c["snr"] >= STRONG]
+
+
+def weaker(cases: list[Case]) -> list[Case]:
+    """Those whose effect was made to stand out of the noise and does not in the tracks that their clip yields."""
+    return [c for c in cases if c["kind"] != "nothing" and c.get("snr_set", c["snr"]) >= STRONG > c["snr"]]
 
 
 def figures(cases: list[Case]) -> dict[str, Any]:

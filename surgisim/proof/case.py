@@ -39,6 +39,8 @@ def score(
         "concealed": [_concealed(e) for e in truth.effects],
         "snr": told["snr"],
         "snr_held_out": told["snr_held_out"],
+        "snr_set": told.get("snr_set", told["snr"]),
+        "scale": told.get("scale", 1.0),
         "noise": told["noise"],
         "phases": phases(recording),
         **naming(told["kind"], truth.names, verdict),

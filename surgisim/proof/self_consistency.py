@@ -48,16 +48,9 @@ def draws(case: Case, count: int, seed: int, drawn: Drawn) -> np.ndarray:
 
 def recorded(recording: Recording, kept: np.ndarray, rest: np.ndarray, moved: np.ndarray, number: int) -> Recording:
     """The recording with the points `kept` alone, (K,), moved from `rest` [m], (K, 3), as drawn [m], (K, T, 3)."""
-    visible, place = recording.visible[kept], recording.place
-    points = np.where(visible[..., None], rest[:, None] + moved, np.nan)
-    return dataclasses.replace(
-        recording,
-        name=f"{recording.name}-{number}",
-        points=points.astype(np.float32),
-        visible=visible,
-        sigma=recording.sigma[kept],
-        place=None if place is None else place[kept],
-    )
+    some = recording.of(kept)
+    points = np.where(some.visible[..., None], rest[:, None] + moved, np.nan)
+    return dataclasses.replace(some, name=f"{recording.name}-{number}", points=points.astype(np.float32))
 
 
 def consistency(diagnoses: list[dict[str, Any]], seed: int = 0) -> dict[str, Any]:

@@ -5,7 +5,8 @@ recording.json  format, name, fps, frames, length_unit (m, cm or mm; of every fi
 rest.ply        closed triangle mesh of the body at rest
 fixed.json      {"boxes": [{"min": [x, y, z], "max": [x, y, z]}]}: regions of rest space held still
 grip.npz        center_rest (J, 3), radius (J,), position (J, T, 3), active (J, T): translating grips
-tracks.npz      points (K, T, 3), NaN where unseen; visible (K, T); sigma (K,); optional place (K, 3) on the rest body
+tracks.npz      points (K, T, 3), NaN where unseen; visible (K, T); sigma (K,); optional place (K, 3) on the rest body,
+                axes (K, 3): noise along x, y and z over sigma, RMS 1, where it is not alike
 split.json      {"fit": [0, t1], "held_out": [t1, T]}
 
 Keys that are not named here are passed over.
@@ -51,9 +52,9 @@ def read_recording(folder: Path) -> Recording:
         )
     tracks = arrays(
         _there(folder / "tracks.npz"),
-        {"points": "KT3", "visible": "KT", "sigma": "K", "place": "K3"},
+        {"points": "KT3", "visible": "KT", "sigma": "K", "place": "K3", "axes": "K3"},
         frames,
-        ("place",),
+        ("place", "axes"),
     )
     points, visible = tracks["points"] * unit, tracks["visible"].astype(bool)
     if not np.isfinite(points[visible]).all():
@@ -67,6 +68,11 @@ def read_recording(folder: Path) -> Recording:
         raise Problem(f"{folder / 'tracks.npz'}: point {unseen[0]} is never visible. Leave it out.")
     if not (np.isfinite(tracks["sigma"]) & (tracks["sigma"] >= 0)).all():
         raise Problem(f"{folder / 'tracks.npz'}: sigma must be finite and not negative. Give each point's noise.")
+    axes = tracks["axes"].astype(float) if "axes" in tracks else None
+    if axes is not None and not (np.isfinite(axes) & (axes > 0)).all():
+        raise Problem(
+            f"{folder / 'tracks.npz'}: axes must be finite and positive. Give how noise is shared by x, y, z."
+        )
     return Recording(
         name=told["name"],
         fps=told["fps"],
@@ -81,6 +87,7 @@ def read_recording(folder: Path) -> Recording:
         tier=told["tier"],
         starts=told["starts"],
         place=tracks["place"].astype(float) * unit if "place" in tracks else None,
+        axes=None if axes is None else axes / np.sqrt((axes**2).mean(1, keepdims=True)),
         split=split_of(folder / "split.json", frames) if (folder / "split.json").is_file() else None,
     )
 
@@ -108,6 +115,8 @@ def encoded_recording(recording: Recording) -> dict[str, bytes]:
     tracks = {"points": recording.points.astype(np.float32), "visible": recording.visible, "sigma": recording.sigma}
     if recording.place is not None:
         tracks["place"] = recording.place
+    if recording.axes is not None:
+        tracks["axes"] = recording.axes
     grips = {"center_rest": motion.center_rest, "radius": motion.radius}
     grips |= {"position": motion.position, "active": motion.active}
     files = {

@@ -31,7 +31,7 @@ def recording_of(
 ) -> Recording:  # fmt: skip
     """Tracked points, grips, body and held boundary of a clip, in the camera's frame.
 
-    A point's noise is the RMS of what the tracker says of it across and along the view. Frames held out after the
+    A point's noise is what the tracker says of it across and along the view, axis by axis. Frames held out after the
     fitted ones are held out here too; those between are fitted. Raises Problem where no point was seen in frame 0.
     """
     first = tracks.xyz[:, 0]
@@ -40,8 +40,8 @@ def recording_of(
         raise Problem(f"clip {name}: no tracked point has a depth in frame 0, so none can be followed on the body.")
     points = tracks.xyz[kept]
     visible = tracks.visible[kept] & np.isfinite(points).all(-1)
-    across, along = np.moveaxis(np.where(visible[..., None], tracks.sigma_xyz[kept], np.nan), -1, 0)
-    sigma = np.sqrt(np.nanmedian((2 * across**2 + along**2) / 3, axis=1))
+    noise = along_axes(points[:, 0], np.where(visible[..., None], tracks.sigma_xyz[kept], np.nan))
+    sigma = np.sqrt((noise**2).mean(1))
     after = np.flatnonzero(frames.split == AFTER)
     total = len(frames.split)
     until = int(after[0]) if len(after) else round(FITTED * total)
@@ -58,8 +58,19 @@ def recording_of(
         density=physics.density,
         tier="video",
         place=points[:, 0].astype(float),
+        axes=noise / sigma[:, None],
         split=split,
     )
+
+
+def along_axes(first: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Noise along x, y and z [m], (K, 3), of points seen from the origin at `first` [m], (K, 3).
+
+    sigma: across and along the view [m], (K, T, 2), NaN where not seen. What two axes share is left out.
+    """
+    across, along = np.moveaxis(np.nanmedian(sigma.astype(float) ** 2, axis=1), -1, 0)
+    ray = first / np.linalg.norm(first, axis=1, keepdims=True)
+    return np.sqrt(across[:, None] + (along - across)[:, None] * ray**2)
 
 
 def surface(body: Body) -> Mesh:

@@ -1,6 +1,6 @@
 """Tracked points of a body whose shape, holders and grips are known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -40,6 +40,8 @@ class Recording:
     """What frame 0 is: the rest shape in equilibrium with gravity, or an unloaded shape that is let go there."""
     place: np.ndarray | None = None
     """Where each point sits on the body at rest [m], (K, 3), if not where it is first seen."""
+    axes: np.ndarray | None = None
+    """Each point's noise along each axis of the frame over `sigma` [1], (K, 3), of RMS 1, if not alike."""
     split: dict[str, tuple[int, int]] | None = None
     """Frames `fit` and `held_out`, first and one past the last."""
 
@@ -57,10 +59,25 @@ class Recording:
             self.place is None or self.place.shape == (k, 3),
             f"recording {self.name}: 'place' must give a rest position for each of the {k} points.",
         )
+        check(
+            self.axes is None or self.axes.shape == (k, 3),
+            f"recording {self.name}: 'axes' must give three shares of the noise for each of the {k} points.",
+        )
 
     @property
     def frames(self) -> int:
         return self.points.shape[1]
+
+    @property
+    def noise(self) -> np.ndarray:
+        """Nominal noise of each point along each axis [m], (K, 3)."""
+        return self.sigma[:, None] * (np.ones((1, 3)) if self.axes is None else self.axes)
+
+    def of(self, kept: np.ndarray | slice) -> "Recording":
+        """Some of the points alone, as an index, (M,), or a slice chooses them."""
+        names = ("points", "visible", "sigma", "place", "axes")
+        chosen = {name: value[kept] for name in names if (value := getattr(self, name)) is not None}
+        return replace(self, **chosen)
 
     @property
     def fitted_until(self) -> int:

@@ -1,5 +1,7 @@
 """Tracking noise is told from quiet frames, and whitened away."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from planted import NOISE
@@ -28,6 +30,38 @@ def test_the_noise_that_was_drawn_is_found(drawn):
     white = whitener(found, rest, seen)(tracks)
     freedom = 3 * (seen.sum() - 50)
     assert (white**2).sum() / freedom == pytest.approx(1.0, abs=0.1)
+
+
+AXES = np.sqrt([0.15, 0.15, 2.7])
+
+
+def test_depth_that_is_less_sure_weighs_less(drawn):
+    rest, noise, *_ = drawn
+    uneven = replace(noise, axes=np.tile(AXES, (50, 1)))
+    assert uneven.sigma == noise.sigma
+    seen = np.random.default_rng(8).random((50, FRAMES)) > 0.02
+    field = uneven.draw(rest, FRAMES, np.random.default_rng(7))
+    white = whitener(uneven, rest, seen)(field).reshape(50, FRAMES, 3)
+    assert (white**2).mean((0, 1)) == pytest.approx([1, 1, 1], abs=0.1)
+    whiten = whitener(uneven, rest, seen)
+    other = np.random.default_rng(9).standard_normal(field.shape)
+    assert whiten(other) @ whiten(field) == pytest.approx((other * whiten.back(whiten(field))).sum())
+
+
+def test_errors_that_still_frames_do_not_show_are_at_least_as_large_as_said(drawn):
+    rest, noise = drawn[0][:20], drawn[1].of(np.arange(20))
+    axes, seen = np.tile(AXES, (20, 1)), np.ones((20, FRAMES), bool)
+    tracks = replace(noise, axes=axes).draw(rest, FRAMES, np.random.default_rng(7))
+    told = (tracks, seen, rest, np.ones(FRAMES, bool))
+    quiet, loud = (estimate(*told, np.full(20, sigma), axes) for sigma in (2e-5, 3e-3))
+    assert quiet.sigma == pytest.approx(noise.sigma, rel=0.3)
+    assert loud.sigma == pytest.approx(3e-3)
+    assert (loud.keep_shared, loud.length) >= (0.95, 0.012)
+    # A smooth change as large as that is nothing then; without axes, frames at rest have the word.
+    bent = 3e-3 * np.exp(-(((rest[:, :1] - 0.02) / 0.015) ** 2))[..., None] * np.linspace(0, 1, FRAMES)[:, None] * AXES
+    beyond = [(whitener(n, rest, seen)(bent) ** 2).sum() for n in (loud, quiet)]
+    assert beyond[0] < 200 < 2000 < beyond[1]
+    assert estimate(*told, np.full(20, 3e-3)).sigma < 1e-3
 
 
 def test_a_constant_of_a_point_is_no_residual(drawn):

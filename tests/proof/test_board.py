@@ -13,7 +13,7 @@ from proof.test_score import scored
 
 from surgisim.problem import Problem
 from surgisim.proof.ablations import losses
-from surgisim.proof.board import pooled, scoreboard, with_metadata
+from surgisim.proof.board import pooled, scoreboard, weaker, with_metadata
 from surgisim.proof.calibration import calibration
 from surgisim.proof.case import phases
 from surgisim.proof.chance import chance
@@ -60,6 +60,18 @@ def test_the_board_counts_what_the_cases_say(run):
         "top1": True, "top2": False, "false_discovery": True, "held_back": True, "place_right": True, "cut": True,
         "placebo_better": True,
     }  # fmt: skip
+
+
+def test_effects_that_tracks_show_less_than_they_were_made_to_stand_out_are_reported_apart(run):
+    lost, kept = ({**case, "snr": ratio, "snr_set": 4.0} for case, ratio in zip(run[1][:2], (1.2, 4.0), strict=True))
+    empty = {**run[1][5], "snr_set": 0.0}
+    assert weaker([lost, kept, empty]) == [lost]
+    board = scoreboard([lost, kept, empty])
+    assert board["figures"]["weaker"]["top1"]["count"] == board["figures"]["strong"]["top1"]["count"] == 1
+    shown = page(board).decode()
+    assert "In 1 case the effect was made to stand out" in shown
+    assert "1.2 <small>(4.0)</small>" in shown
+    assert "was made to stand out" not in page(scoreboard([kept, empty])).decode()
 
 
 def test_every_case_is_in_the_confusion_once(run):

@@ -51,6 +51,18 @@ def test_a_clip_survives_the_way_through_a_folder(tmp_path):
     assert filled.held.mean() == pytest.approx(body.held.mean(), abs=0.1)
 
 
+def test_noise_across_and_along_the_view_survives_too(tmp_path):
+    body, material, physics, tracks, *rest = clip()
+    sigma = np.broadcast_to(np.float32([1e-4, 5e-4]), tracks.sigma_xyz.shape)
+    found = recording_of("slab", body, material, physics, dataclasses.replace(tracks, sigma_xyz=sigma), *rest)
+    ray = found.place / np.linalg.norm(found.place, axis=1, keepdims=True)
+    assert found.noise**2 == pytest.approx(1e-8 + 24e-8 * ray**2, rel=1e-4)
+    assert found.sigma == pytest.approx(np.sqrt(9e-8), rel=1e-4)
+    write_recording(found, tmp_path)
+    assert read_recording(tmp_path).noise == pytest.approx(found.noise)
+    assert found.of(np.arange(3)).axes.shape == (3, 3)
+
+
 def test_the_surface_encloses_the_body():
     body = slab()
     mesh = surface(body)

@@ -20,9 +20,20 @@ def jobs(tree):
 
     shutil.copy(Path(__file__).with_name("stand_in.py"), tree.root / "stages" / "diagnosis.py")
 
-    def planned(target: str) -> list[tuple[str, list[str], list[str]]]:
+    def planned(target: str, *more: str) -> list[tuple[str, list[str], list[str]]]:
         command = [sys.executable, "-m", "snakemake", "--snakefile", str(tree.root / "workflow" / "Snakefile")]
-        command += ["--directory", str(tree.root), "--cores", "1", "--dry-run", target, "--config", "cases=3", "seed=5"]
+        command += [
+            "--directory",
+            str(tree.root),
+            "--cores",
+            "1",
+            "--dry-run",
+            target,
+            "--config",
+            "cases=3",
+            "seed=5",
+            *more,
+        ]
         said = subprocess.run(command, env=tree.environment(), capture_output=True, text=True, timeout=120)
         assert said.returncode == 0, said.stdout + said.stderr
         return [
@@ -63,6 +74,30 @@ def test_no_diagnosis_starts_before_all_answers_are_sealed(jobs):
             assert seals[1][0] in inputs
         if rule not in ("invent", "score"):
             assert not [path for path in inputs if "/sealed/" in path], rule
+
+
+def test_a_clip_that_conceals_goes_through_the_graph_and_only_its_score_opens_the_truth(jobs):
+    planned = jobs("blind", "tier=video")
+    made = {out: inputs for _, inputs, outputs in planned for out in outputs}
+    rules = [rule for rule, *_ in planned]
+    for rule in ("invent_clip", "ingest", "tracking", "estimation", "recorded", "diagnosis", "score"):
+        assert rules.count(rule) == 3, rule
+    assert not {"invent", "phantom", "simulation"} & set(rules)
+    assert made["results/video-5-1/main/ingest/frames.npz"] == ["blind/video-5/1/clip.mp4"]
+    for rule, inputs, outputs in planned:
+        if rule not in ("invent_clip", "score"):
+            assert not [path for path in inputs if "/sealed/" in path], rule
+        if rule == "diagnosis":
+            assert not [path for path in above(made, outputs[0]) if "/sealed/" in path]
+            assert "blind/video-5/seals.txt" in inputs
+            assert "results/video-5-1/main/tracking/tracks.npz" in above(made, "blind/video-5/1/main/diagnosis.json")
+    (scored,) = (inputs for rule, inputs, outputs in planned if "blind/video-5/1/main/score.json" in outputs)
+    assert {"blind/video-5/1/sealed/truth.json", "results/video-5-1/main/ingest/camera.json"} <= set(scored)
+
+
+def test_a_tier_that_nobody_knows_is_one_sentence(tree):
+    tree.choices = {"cases": 1, "seed": 5, "tier": "film"}
+    assert "config key 'tier' is 'film'; ['tracks', 'video'] are known." in tree.says("--dry-run", "blind")
 
 
 def test_shuffled_paths_are_another_cases(jobs):

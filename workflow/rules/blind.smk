@@ -1,11 +1,12 @@
 """Recordings that conceal some physics: invented, sealed, diagnosed, and only then opened and scored.
 
 `snakemake blind --config cases=40 seed=7`. What they conceal lies in sealed/, which the rule `score` alone reads.
+With tier=video a case is an mp4, which goes through the whole graph before what became of it is diagnosed.
 """
 
 
 wildcard_constraints:
-    seed=r"\d+",
+    seed=r"(video-)?\d+",
     case=r"\d+",
     way="|".join(WAYS),
     shorter="|".join(SHORTER),
@@ -28,6 +29,8 @@ rule invent:
         "logs/blind/{seed}/{case}/invent.log",
     benchmark:
         "benchmarks/blind/{seed}/{case}/invent.tsv"
+    wildcard_constraints:
+        seed=r"\d+",
     conda:
         "../../envs/physics.yaml"
     resources:
@@ -39,6 +42,33 @@ rule invent:
         'python "$SURGISIM/stages/invent.py"'
         " --recording {output.recording} --rest {output.rest} --fixed {output.fixed} --grip {output.grip}"
         " --tracks {output.tracks} --split {output.split} --seal {output.seal}"
+        " --truth {output.truth} --truth-tracks {output.truth_tracks} --salt {output.salt}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
+rule invent_clip:
+    output:
+        clip="blind/{seed}/{case}/clip.mp4",
+        seal="blind/{seed}/{case}/seal.txt",
+        truth="blind/{seed}/{case}/sealed/truth.json",
+        truth_tracks="blind/{seed}/{case}/sealed/truth.npz",
+        salt="blind/{seed}/{case}/sealed/salt.txt",
+    log:
+        "logs/blind/{seed}/{case}/invent_clip.log",
+    benchmark:
+        "benchmarks/blind/{seed}/{case}/invent_clip.tsv"
+    wildcard_constraints:
+        seed=r"video-\d+",
+    conda:
+        "../../envs/physics.yaml"
+    resources:
+        mem_mb=2000,
+    params:
+        settings=inventing,
+        code=code("invent_clip"),
+    shell:
+        'python "$SURGISIM/stages/invent_clip.py"'
+        " --clip {output.clip} --seal {output.seal}"
         " --truth {output.truth} --truth-tracks {output.truth_tracks} --salt {output.salt}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
@@ -94,7 +124,7 @@ rule shuffle:
 
 rule shorten:
     input:
-        recording=expand("blind/{{seed}}/{{case}}/recording/{name}", name=FILES),
+        recording=whole,
     output:
         recording="blind/{seed}/{case}/{shorter}/recording/recording.json",
         rest="blind/{seed}/{case}/{shorter}/recording/rest.ply",
@@ -190,6 +220,7 @@ rule score:
         truth="blind/{seed}/{case}/sealed/truth.json",
         truth_tracks="blind/{seed}/{case}/sealed/truth.npz",
         salt="blind/{seed}/{case}/sealed/salt.txt",
+        camera=camera,
     output:
         score="blind/{seed}/{case}/{way}/score.json",
     log:
@@ -202,19 +233,20 @@ rule score:
         mem_mb=1000,
     params:
         recording=folder,
+        camera=lambda w, input: f"--camera {input.camera}" if input.camera else "",
         code=code("score"),
     shell:
         'python "$SURGISIM/stages/score.py" --recording {params.recording}'
         " --diagnosis {input.diagnosis} --physics {input.physics} --mismatch {input.mismatch}"
         " --seal {input.seal} --seals {input.seals}"
         " --truth {input.truth} --truth-tracks {input.truth_tracks} --salt {input.salt}"
-        " --score {output.score} --code {params.code} > {log} 2>&1"
+        " {params.camera} --score {output.score} --code {params.code} > {log} 2>&1"
 
 
 rule scoreboard:
     input:
         score=every("blind/{seed}/{case}/{way}/score.json"),
-        recording=every("blind/{seed}/{case}/recording/recording.json"),
+        recording=recordings,
         pages=every("blind/{seed}/{case}/{way}/diagnosis.html"),
     output:
         board="blind/{seed}/{way}/scoreboard.json",
@@ -247,12 +279,12 @@ rule scoreboard:
 
 rule blind:
     input:
-        f"blind/{SEED}/main/scoreboard.html",
+        f"blind/{room(SEED)}/main/scoreboard.html",
 
 
 rule pooled:
     input:
-        boards=expand("blind/{seed}/main/scoreboard.json", seed=SEEDS),
+        boards=expand("blind/{seed}/main/scoreboard.json", seed=map(room, SEEDS)),
     output:
         board="blind/pooled/scoreboard.json",
         table="blind/pooled/scoreboard.csv",
@@ -271,7 +303,9 @@ rule pooled:
     resources:
         mem_mb=1000,
     params:
-        settings=lambda w: json.dumps({"pages": "../{seed}/{case}/main/diagnosis.html"}),
+        settings=lambda w: json.dumps(
+            {"pages": f"../{room('{seed}')}/{{case}}/main/diagnosis.html"}
+        ),
         code=code("pooled"),
     shell:
         'python "$SURGISIM/stages/pooled.py" --boards {input.boards}'
@@ -286,7 +320,7 @@ rule blind_pooled:
 
 rule blind_shuffled:
     input:
-        f"blind/{SEED}/shuffled/scoreboard.html",
+        f"blind/{room(SEED)}/shuffled/scoreboard.html",
 
 
 rule ablations:
@@ -316,9 +350,9 @@ rule ablations:
 
 rule blind_ablations:
     input:
-        f"blind/{SEED}/ablations.html",
+        f"blind/{room(SEED)}/ablations.html",
 
 
 rule blind_phases:
     input:
-        f"blind/{SEED}/phases.html",
+        f"blind/{room(SEED)}/phases.html",

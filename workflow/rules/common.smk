@@ -8,13 +8,13 @@ from pathlib import Path
 ROOT = Path(workflow.basedir).parent
 sys.path.insert(0, str(ROOT))
 
-from surgisim.clips import invented
+from surgisim.clips import Clip, invented
 from surgisim.config.base import parse as checked
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.config.invent import Invent
+from surgisim.config.invent import Invent, InventClip
 from surgisim.config.whole import PARENTS
 from surgisim.digest import digest
-from surgisim.phantom.family import family
+from surgisim.phantom.family import family, told_focal
 from surgisim.plan import plan
 from surgisim.problem import Problem
 from surgisim.proof.known.catalogue import catalogue as known_recordings
@@ -22,6 +22,7 @@ from surgisim.proof.shuffle import partner
 
 # What the rules for concealed recordings read of the config, beside the clips' choices.
 BLIND = (
+    "tier",
     "seed",
     "seeds",
     "cases",
@@ -33,6 +34,33 @@ BLIND = (
     "draws",
 )
 
+# Concealed recordings (blind.smk): what is seen of them, which seed (several on one board: `seeds`), and how many cases.
+TIERS = {"tracks": "", "video": "video-"}
+TIER = config.get("tier", "tracks")
+if TIER not in TIERS:
+    raise WorkflowError(f"config key 'tier' is {TIER!r}; {list(TIERS)} are known.")
+SEED, COUNT = int(config.get("seed", 1)), int(config.get("cases", 40))
+SEEDS = [int(seed) for seed in config.get("seeds", [SEED])]
+
+
+def room(seed):
+    """The folder of a seed's cases under blind/, which tells the tier."""
+    return f"{TIERS[TIER]}{seed}"
+
+
+def filmed():
+    """Clips that conceal something or nothing, by name: all that the graph gets to know is the mp4, and maybe its focal."""
+    return {
+        f"{room(seed)}-{case}": Clip(
+            f"{room(seed)}-{case}",
+            Path(f"blind/{room(seed)}/{case}/clip.mp4"),
+            {"ingest": {"focal": told_focal(seed, case)}},
+        )
+        for seed in SEEDS
+        for case in range(COUNT)
+    }
+
+
 # A number of clips, `clips=40 seed=3`, asks for as many of the phantom's family instead of those of a table.
 CLIPS = config.get("clips", ROOT / "config" / "clips.tsv")
 try:
@@ -43,9 +71,13 @@ try:
             if key not in ("clips", "variants", *BLIND)
         },
         clips=(
-            invented(family(int(config.get("seed", 1)), int(CLIPS)))
-            if str(CLIPS).isdigit()
-            else Path(CLIPS)
+            filmed()
+            if TIER == "video"
+            else (
+                invented(family(SEED, int(CLIPS)))
+                if str(CLIPS).isdigit()
+                else Path(CLIPS)
+            )
         ),
         variants=Path(config.get("variants", ROOT / "config" / "variants.yaml")),
     )
@@ -133,9 +165,7 @@ def benchmarks(w):
     return ":".join(f"benchmarks/{w.clip}/{home}/{stage}.tsv" for stage, home in homes)
 
 
-# Concealed recordings (blind.smk): which seed (several on one board: `seeds`), how many cases, and the files of each.
-SEED, COUNT = int(config.get("seed", 1)), int(config.get("cases", 40))
-SEEDS = [int(seed) for seed in config.get("seeds", [SEED])]
+# The files of a recording.
 FILES = (
     "recording.json",
     "rest.ply",
@@ -168,11 +198,12 @@ def inventing(w):
     """Params function: what the phantom may choose from, checked here so that a mistake is said before anything runs."""
     told = {
         **config.get("invent", {}),
-        "seed": int(getattr(w, "seed", SEED)),
+        "seed": number(getattr(w, "seed", SEED)),
         "case": int(w.case),
     }
+    kind = InventClip if TIER == "video" else Invent
     try:
-        return json.dumps(checked(Invent, told, "config key 'invent'").model_dump())
+        return json.dumps(checked(kind, told, "config key 'invent'").model_dump())
     except Problem as problem:
         raise WorkflowError(str(problem)) from None
 
@@ -190,9 +221,45 @@ def with_changes(changes):
 
 def shown(w):
     """The files of the recording that this way of diagnosing gets to see."""
-    changed = w.way == "shuffled" or w.way in SHORTER
-    folder = f"{w.way}/recording" if changed else "recording"
-    return [f"blind/{w.seed}/{w.case}/{folder}/{name}" for name in FILES]
+    if w.way == "shuffled" or w.way in SHORTER:
+        return [f"blind/{w.seed}/{w.case}/{w.way}/recording/{name}" for name in FILES]
+    return whole(w)
+
+
+def whole(w):
+    """The files of a case's recording: as it was invented, or what the graph made of its clip."""
+    return [f"{home(w.seed, w.case)}/{name}" for name in FILES]
+
+
+def home(seed, case):
+    """The folder of a case's whole recording."""
+    if is_filmed(seed):
+        return f"results/{seed}-{case}/main/diagnosis/recording"
+    return f"blind/{seed}/{case}/recording"
+
+
+def is_filmed(seed):
+    """Whether the cases in a seed's folder are clips."""
+    return str(seed).startswith(TIERS["video"])
+
+
+def recordings(w):
+    """The first file of every case's whole recording."""
+    return [f"{home(w.seed, case)}/{FILES[0]}" for case in range(COUNT)]
+
+
+def camera(w):
+    """What the graph took the camera of a case's clip to be; nothing of a recording that was no clip."""
+    return (
+        f"results/{w.seed}-{w.case}/main/ingest/camera.json"
+        if is_filmed(w.seed)
+        else []
+    )
+
+
+def number(seed):
+    """A seed without its tier."""
+    return int(str(seed).rpartition("-")[2])
 
 
 def others(w):

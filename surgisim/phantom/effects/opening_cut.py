@@ -39,12 +39,14 @@ class Opening:
 def draw(scene, rng, name):
     hold = scene.holds[0]
     at = near_grip(scene, rng, (hold.grip.radius + 0.002, hold.grip.radius + 0.005), (0.0, 0.01))
-    along = at - scene.shape.upper(hold.grip.uv)
-    along[2] = 0.0
+    up, along = -scene.shape.axes[2], at - scene.shape.upper(hold.grip.uv)
+    along = along - (along @ up) * up
+    along /= np.linalg.norm(along)
     # Across the line to the grip, so that the pull opens it.
-    heading = math.atan2(along[1], along[0]) + np.pi / 2 + rng.uniform(-0.4, 0.4)
+    turn = rng.uniform(-0.4, 0.4)
+    cut = math.cos(turn) * np.cross(up, along) - math.sin(turn) * along
     begin = rng.uniform(hold.arrive + 2, (hold.arrive + hold.release) / 2) / scene.fps
-    numbers = {"along": ([math.cos(heading), math.sin(heading), 0.0], "1"), "depth": (rng.uniform(0.7, 0.95), "1")}
+    numbers = {"along": (cut.tolist(), "1"), "depth": (rng.uniform(0.7, 0.95), "1")}
     return Hidden(name, center=at, extent=None, onset=begin, numbers=numbers)
 
 
@@ -57,12 +59,12 @@ def apply(model, hidden):
     along, shape = hidden.vector("along"), model.scene.shape
     off = model.centers - hidden.center
     edge = 0.0035
-    across = np.abs(off @ np.cross([0.0, 0.0, 1.0], along))
+    across = np.abs(off @ np.cross(shape.axes[2], along))
     deep = hidden.number("depth") * shape.thickness
     slab = [
         (1.1 * edge - across) / edge,
         (length(model.scene, hidden) / 2 - np.abs(off @ along)) / edge,
-        (deep - np.abs(off[:, 2])) / edge + 0.5,
+        (deep - np.abs(off @ shape.axes[2])) / edge + 0.5,
     ]
     share = in_lanes(np.prod([np.clip(s, 0, 1) for s in slab], axis=0))
     parts = model.parts

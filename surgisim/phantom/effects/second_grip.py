@@ -43,7 +43,8 @@ def draw(scene, rng, name):
     begin = in_phase(scene, rng, 0.2, 1.2)
     against = -scene.holds[0].pull / np.linalg.norm(scene.holds[0].pull)
     # It can lift, but hardly push down.
-    against[2] = abs(against[2])
+    into = max(float(against @ scene.shape.axes[2]), 0.0)
+    against = against - 2 * into * scene.shape.axes[2]
     return Hidden(
         name,
         center=at,

@@ -49,11 +49,4 @@ def half_points(recording: Recording, rng: np.random.Generator) -> Recording:
     """Half of the points, by chance."""
     count = len(recording.points)
     kept = np.sort(rng.choice(count, max(count // 2, 1), replace=False))
-    place = recording.place
-    return dataclasses.replace(
-        recording,
-        points=recording.points[kept],
-        visible=recording.visible[kept],
-        sigma=recording.sigma[kept],
-        place=None if place is None else place[kept],
-    )
+    return recording.of(kept)

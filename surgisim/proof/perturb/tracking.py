@@ -18,7 +18,7 @@ def noisier(recording: Recording, rng: np.random.Generator, true: np.ndarray | N
     if true is not None:
         points = true + factor * (recording.points - true)
     else:
-        added = math.sqrt(factor**2 - 1) * recording.sigma[:, None, None]
+        added = math.sqrt(factor**2 - 1) * recording.noise[:, None]
         points = recording.points + added * rng.standard_normal(recording.points.shape)
     return dataclasses.replace(recording, points=points.astype(np.float32), sigma=factor * recording.sigma)
 

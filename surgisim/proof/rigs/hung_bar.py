@@ -66,7 +66,7 @@ def some(bar: Recording, which: slice) -> Recording:
     """Some of its points, seen at the end only."""
     points, visible = bar.points[which].copy(), bar.visible[which].copy()
     points[:, :-SEEN], visible[:, :-SEEN] = np.nan, False
-    return dataclasses.replace(bar, points=points, visible=visible, sigma=bar.sigma[which], place=bar.place[which])
+    return dataclasses.replace(bar.of(which), points=points, visible=visible)
 
 
 def silicone(E: float) -> Values:

@@ -63,7 +63,7 @@ def told(figure: dict[str, Any], unit: str = "%") -> str:
 
 
 COLUMNS = (
-    "recording", "seed", "case", "kind", "concealed", "snr", "snr_held_out", "phases", "verdict", "named",
+    "recording", "seed", "case", "kind", "concealed", "snr", "snr_set", "snr_held_out", "phases", "verdict", "named",
     "probability", "probability_of_truth", "top1", "top2", "ranked_first", "both", "false_discovery", "held_back",
     "abstained", "place_mm", "place_cells", "onset_frames", "parameters", "before_mm", "after_mm", "placebo_mm",
     "oracle_mm", "noise_floor_mm", "share_of_oracle",
