@@ -20,7 +20,7 @@ from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.carrying import carrying, course
 from surgisim.estimation.damping import numerical_damping
-from surgisim.estimation.gauss_newton import Solution
+from surgisim.estimation.gauss_newton import Solution, derivative
 from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.lay import Laying, upright
 from surgisim.estimation.light_along_tracks import brightness, spoilt
@@ -36,6 +36,7 @@ from surgisim.estimation.otherwise import (
     otherwise,
     resolution,
     rivals,
+    settled,
     shares,
 )
 from surgisim.estimation.picture import picture_loss
@@ -56,6 +57,7 @@ from surgisim.estimation.stated import by_phase
 from surgisim.estimation.support import EDGES, Support, open_depth
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
+from surgisim.mpm.simulator import Breakdown
 from surgisim.physics.catalogue import choose, columns
 from surgisim.physics.place import Place
 from surgisim.problem import Problem
@@ -64,8 +66,8 @@ Say = Callable[[float, float, str], None]
 
 FLOOR = 0.01
 """Least standard deviation of a tracked displacement, as a share of the grid's spacing."""
-FINER = 1.5
-"""How many times finer the grid is that a fit ends on."""
+FINER, NEARLY = 1.5, 1e-3
+"""How many times finer the grid is that a fit ends on, and the share of its cost that a step must win there at last."""
 STILL = 0.5
 """Motion below which a track is taken to stand still [px]."""
 
@@ -263,7 +265,7 @@ def _weighed(
     numbers lie from those that fit on this grid, (M,).
     """
     first, wanted = trial, trial.wanted
-    found = answers(solution, wanted, list(rivals(trial, solution.x)), _part(progress, 0.55, 0.63))
+    found = answers(solution, list(rivals(trial, solution.x)), _part(progress, 0.55, 0.63))
     chosen = better(solution, wanted, found, trial.regions)
     if chosen:
         begun = Answer(Otherwise("as first found", first, rival=True), solution.x, None, found[0].cost)
@@ -271,7 +273,7 @@ def _weighed(
         trial, solution = descend(chosen.one.trial, chosen.x, ends, settings, history, progress)
     else:
         found = found[1:]
-    here, *others = answers(solution, wanted, list(ask(trial, solution.x)), _part(progress, 0.63, 0.7))
+    here, *others = answers(solution, list(ask(trial, solution.x)), _part(progress, 0.63, 0.7))
     if here.residual is not None:
         solution = Solution(here.x, here.residual, solution.jacobian)
     found += others
@@ -294,19 +296,28 @@ def _weighed(
 def _finely(trial: Trial, solution: Solution, history: list, progress: Say) -> tuple[Trial, Solution]:
     """The fit brought to a finer grid, on which a ring-down's shorter waves run as fast as they should.
 
-    By steps of the derivative that the wider grid gave: there each costs a fifth. As it was where that cannot be
-    simulated; `history` says so.
+    First by steps of the derivative that the wider grid gave, then of its own. Where that cannot be simulated it stays as
+    it was, with a line in `history`.
     """
     fine = replace(trial, laying=trial.laying.finer(FINER))
     change = on_no_grid(fine, solution.x)[0] - on_no_grid(trial, solution.x)[0]
     begin = np.clip(solution.x - change, *trial.wanted.bounds)
-    (found,) = answers(solution, trial.wanted, [Otherwise("the grid were finer", fine, begin=begin)], progress)
+    progress(0.0, 1.0, "on a finer grid")
+    found = settled(Otherwise("finer grid", fine, begin=begin), solution)
     if found.residual is None:
         # A finer grid follows a sharper fold, and can turn inside out where a wider one does not.
         history.append({"round": "finer grid", "cost": None, "broke": "what fits on the wider grid"})
         return trial, solution
+    progress(0.4, 1.0, f"on a finer grid: {plain(trial.wanted, found.x)}")
+    try:
+        J = derivative(fine.together, found.x, found.residual, trial.wanted.differences, trial.wanted.bounds)
+    except Breakdown as breakdown:
+        history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
+        return trial, solution
+    here = Solution(found.x, found.residual, J)
+    found = settled(Otherwise("finer grid", fine, begin=found.x), here, enough=NEARLY)
     history.append({"round": "finer grid", "cost": number(found.cost)} | plain(trial.wanted, found.x))
-    return fine, Solution(found.x, found.residual, solution.jacobian)
+    return fine, replace(here, x=found.x, residual=found.residual)
 
 
 def _part(progress: Say, begin: float, end: float) -> Say:

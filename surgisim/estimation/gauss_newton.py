@@ -57,17 +57,7 @@ def gauss_newton(
         return together(xs) if together else at_once(residual, xs, workers)
 
     def jacobian_at(x: np.ndarray, r: np.ndarray) -> np.ndarray:
-        side = np.where(x + differences <= high, 1.0, -1.0) * differences
-        shifted = all_of([x + side[m] * np.eye(len(x))[m] for m in range(len(x))])
-        for m in [m for m, s in enumerate(shifted) if s is None]:
-            side[m] = -side[m]
-            shifted[m] = residual(np.clip(x + side[m] * np.eye(len(x))[m], low, high), 0)
-        if any(s is None for s in shifted):
-            raise Breakdown(
-                "estimation: the simulation breaks down a small step beside the current parameters. "
-                "Start from stiffer tissue (estimation.start), or check the grip."
-            )
-        return np.stack([(s - r) / side[m] for m, s in enumerate(shifted)], -1)
+        return derivative(all_of, x, r, differences, bounds)
 
     def cost_of(r: np.ndarray | None, x: np.ndarray) -> float:
         return np.inf if r is None else share * misfit(r) + float((((x - prior) / spread) ** 2).sum())
@@ -111,6 +101,31 @@ def gauss_newton(
         if done:
             break
     return Solution(x, r, J if fresh else jacobian_at(x, r))
+
+
+def derivative(
+    together: Callable[[list[np.ndarray]], list[np.ndarray | None]],
+    x: np.ndarray,
+    r: np.ndarray,
+    differences: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Derivative of the residuals r, (R,), at x, (M,), by differences of these sizes, (R, M).
+
+    together(xs): the residuals of several x. Raises Breakdown where neither side of a number can be simulated.
+    """
+    low, high = bounds
+    side = np.where(x + differences <= high, 1.0, -1.0) * differences
+    shifted = together(list(x + np.diag(side)))
+    for m in [m for m, s in enumerate(shifted) if s is None]:
+        side[m] = -side[m]
+        (shifted[m],) = together([np.clip(x + side[m] * np.eye(len(x))[m], low, high)])
+    if any(s is None for s in shifted):
+        raise Breakdown(
+            "estimation: the simulation breaks down a small step beside the current parameters. "
+            "Start from stiffer tissue (estimation.start), or check the grip."
+        )
+    return np.stack([(s - r) / side[m] for m, s in enumerate(shifted)], -1)
 
 
 def misfit(r: np.ndarray) -> float:

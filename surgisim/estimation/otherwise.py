@@ -198,14 +198,12 @@ def _laws(trial: Trial, make: Make) -> Iterator[Otherwise]:
                 yield Otherwise(rival, replace(trial, wanted=changed, laying=laying), rival=True)
 
 
-def answers(solution: Solution, wanted: Search, changed: list[Otherwise], say: Say) -> list[Answer]:
+def answers(solution: Solution, changed: list[Otherwise], say: Say) -> list[Answer]:
     """Where the fit lies with each thing changed, in their order; say(done, of, what)."""
-    weights = _weights(solution.residual)
-    hessian = (solution.jacobian * weights[:, None]).T @ solution.jacobian + np.diag(1 / wanted.spread**2)
     said = itertools.count(1)
 
     def of(one: Otherwise, worker: int) -> Answer:
-        found = _settled(one, solution.x, hessian, solution.jacobian, worker)
+        found = settled(one, solution, worker)
         say(next(said), len(changed), f"if it were otherwise: {one.about}")
         return found
 
@@ -244,28 +242,39 @@ def _weights(r: np.ndarray) -> np.ndarray:
     return INDEPENDENT / np.maximum(1.0, np.abs(r) / WIDTH)
 
 
-def _settled(one: Otherwise, x: np.ndarray, hessian: np.ndarray, J: np.ndarray, worker: int) -> Answer:
-    """Where a fit near x lies otherwise, by steps of a derivative taken at x."""
-    trial, wanted = one.trial, one.trial.wanted
+def settled(one: Otherwise, solution: Solution, worker: int = 0, enough: float = ENOUGH) -> Answer:
+    """Where a fit near a solution lies otherwise, by a few steps of the derivative that was taken there.
+
+    Each step corrects the derivative by what it met (Broyden's update, as in `gauss_newton`). enough: the share of the
+    cost that a step must win for another.
+    """
+    trial, wanted, J = one.trial, one.trial.wanted, solution.jacobian
     low, high = wanted.bounds
-    x = x if one.begin is None else one.begin
+    x = solution.x if one.begin is None else one.begin
     free = np.flatnonzero(np.ones(len(x), bool) if one.open is None else one.open)
     r = trial.residual(x, worker)
     if r is None:
         return Answer(one, x, r, np.inf)
     cost, damping = cost_of(r, x, wanted), 0.01
     for _ in range(STEPS):
-        g = J.T @ (_weights(r) * r) + (x - wanted.start) / wanted.spread**2
+        w = _weights(r)
+        hessian = (J * w[:, None]).T @ J + np.diag(1 / wanted.spread**2)
+        g = J.T @ (w * r) + (x - wanted.start) / wanted.spread**2
         step = np.zeros(len(x))
         damped = hessian + damping * np.diag(np.diag(hessian))
         step[free] = np.linalg.solve(damped[np.ix_(free, free)], g[free])
         at = np.clip(x - step, low, high)
         there = trial.residual(at, worker)
-        reached = np.inf if there is None else cost_of(there, at, wanted)
+        if there is None:
+            damping *= 30
+            continue
+        reached, moved = cost_of(there, at, wanted), at - x
+        if moved.any():
+            J = J + np.outer((there - r - J @ moved) / (moved @ moved), moved)
         if reached < cost:
             gained = (cost - reached) / cost
             x, r, cost, damping = at, there, reached, 0.1 * damping
-            if gained < ENOUGH:
+            if gained < enough:
                 break
         else:
             damping *= 30

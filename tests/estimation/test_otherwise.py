@@ -44,7 +44,7 @@ def test_what_was_taken_for_granted_counts_whole():
     noise -= trial.slope @ np.linalg.lstsq(trial.slope, noise, rcond=None)[0]
     other = away(trial, 0.3, 0.0, -0.2)
     for off in (other.off, other.off + noise):
-        [answer] = answers(solution, trial.wanted, [Otherwise("lens", replace(other, off=off))], silent)
+        [answer] = answers(solution, [Otherwise("lens", replace(other, off=off))], silent)
         assert answer.x - solution.x == pytest.approx([0.3, 0.0, -0.2], rel=0.02, abs=1e-3)
         assert shares(solution, trial.wanted, [answer], REGION) == [1.0]
 
@@ -60,7 +60,7 @@ def test_a_misfit_says_less_of_rivals_where_regions_pull_the_numbers_apart():
     for name, off in (("agreeing", noise * np.sqrt(np.mean(apart**2))), ("apart", apart)):
         solution = Solution(trial.wanted.start, off, trial.slope)
         rival = Otherwise("rival", replace(trial, off=1.05 * off), rival=True)
-        [share[name]] = shares(solution, trial.wanted, answers(solution, trial.wanted, [rival], silent), REGION)
+        [share[name]] = shares(solution, trial.wanted, answers(solution, [rival], silent), REGION)
     assert share["agreeing"] < share["apart"] < 0.5
 
 
@@ -70,7 +70,7 @@ def test_rivals_share_by_how_well_they_fit():
     worse[:] = 0.1
     worse -= trial.slope @ np.linalg.lstsq(trial.slope, worse, rcond=None)[0]
     found = answers(
-        solution, trial.wanted,
+        solution,
         [
             Otherwise("as good", away(trial, 0.3, 0.0, 0.0), rival=True),
             Otherwise("poor", replace(trial, off=trial.off + 20 * worse), rival=True),
@@ -86,7 +86,7 @@ def test_a_number_that_is_not_fitted_anew_stays():
     trial, solution = fitted()
     begin = trial.wanted.start + np.array([0.5, 0.0, 0.0])
     one = Otherwise("stiffer", trial, rival=True, begin=begin, open=np.array([False, True, True]))
-    [answer] = answers(solution, trial.wanted, [one], silent)
+    [answer] = answers(solution, [one], silent)
     assert (answer.x - solution.x)[0] == pytest.approx(0.5)
 
 
@@ -95,9 +95,9 @@ def test_a_fit_gives_way_to_a_far_more_probable_one_only():
     off = np.random.default_rng(2).normal(size=COUNT)
     worse = Solution(trial.wanted.start, 1.5 * off, trial.slope)
     changed = [Otherwise("edge", replace(trial, off=off), rival=True)]
-    assert better(worse, trial.wanted, answers(worse, trial.wanted, changed, silent), REGION).one is changed[0]
+    assert better(worse, trial.wanted, answers(worse, changed, silent), REGION).one is changed[0]
     same = Solution(trial.wanted.start, off, trial.slope)
-    assert better(same, trial.wanted, answers(same, trial.wanted, changed, silent), REGION) is None
+    assert better(same, trial.wanted, answers(same, changed, silent), REGION) is None
 
 
 def silent(*_):
