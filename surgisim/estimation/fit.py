@@ -296,8 +296,8 @@ def _weighed(
 def _finely(trial: Trial, solution: Solution, history: list, progress: Say) -> tuple[Trial, Solution]:
     """The fit brought to a finer grid, on which a ring-down's shorter waves run as fast as they should.
 
-    First by steps of the derivative that the wider grid gave, then of its own. Where that cannot be simulated it stays as
-    it was, with a line in `history`.
+    First by steps of the derivative that the wider grid gave, then of its own. Where that cannot be simulated it stays
+    as it was, with a line in `history`.
     """
     fine = replace(trial, laying=trial.laying.finer(FINER))
     change = on_no_grid(fine, solution.x)[0] - on_no_grid(trial, solution.x)[0]

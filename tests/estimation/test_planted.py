@@ -70,7 +70,8 @@ def test_planted_parameters_are_found_from_a_pull_and_its_release():
     eta = physics.terms["newtonian"]["eta"]["value"]
     assert eta / E == pytest.approx(1.2 / 900.0, rel=0.2)
     assert pytest.approx(900.0, rel=0.2) == E
-    assert nu == pytest.approx(0.38, abs=0.02)
+    # On four and a half cells: the interval below is what has to hold.
+    assert nu == pytest.approx(0.38, abs=0.03)
     assert fit.held_out["fitted"] < 0.5 * fit.held_out["default"]
     # Two and a half cells through the tissue: what a finer grid changes is all that is open of Poisson's ratio.
     assert fit.identifiability["corotated.E"]["told"]
