@@ -142,7 +142,18 @@ def test_a_mistake_in_the_config_is_one_sentence(tree):
     assert "there is no key 'reconstruction.iteratons'; did you mean 'iterations'?" in tree.says("--dry-run")
 
 
-CONCEALED = {"invent", "seals", "shuffle", "shorten", "diagnosis", "diagnosis_report", "score", "scoreboard", "pooled"}
+CONCEALED = {
+    "invent",
+    "invent_clip",
+    "seals",
+    "shuffle",
+    "shorten",
+    "diagnosis",
+    "diagnosis_report",
+    "score",
+    "scoreboard",
+    "pooled",
+}
 CONCEALED |= {"robustness", "metamorphic", "perturb", "draws", "draw", "self_consistency"}
 CONCEALED |= {
     "interval_coverage",
@@ -191,4 +202,7 @@ def test_every_stage_has_a_rule_and_every_rule_a_log_a_benchmark_and_a_digest():
 def test_only_the_rule_that_scores_reads_what_is_sealed():
     parts = {name: block.partition("output:") for name, block in blocks().items()}
     assert {name for name, (before, _, _) in parts.items() if "/sealed/" in before} == {"score", "robustness"}
-    assert {name for name, (_, _, after) in parts.items() if "/sealed/" in after} == {"invent"} | TAKEN_OVER
+    assert {name for name, (_, _, after) in parts.items() if "/sealed/" in after} == {
+        "invent",
+        "invent_clip",
+    } | TAKEN_OVER
