@@ -68,6 +68,8 @@ FLOOR = 0.01
 """Least standard deviation of a tracked displacement, as a share of the grid's spacing."""
 FINER, NEARLY = 1.5, 1e-3
 """How many times finer the grid is that a fit ends on, and the share of its cost that a step must win there at last."""
+BROKE = "what fits on the wider grid cannot be simulated on a finer one"
+"""What `history` says where a fit stays on the wider grid."""
 STILL = 0.5
 """Motion below which a track is taken to stand still [px]."""
 
@@ -306,7 +308,7 @@ def _finely(trial: Trial, solution: Solution, history: list, progress: Say) -> t
     found = settled(Otherwise("finer grid", fine, begin=begin), solution)
     if found.residual is None:
         # A finer grid follows a sharper fold, and can turn inside out where a wider one does not.
-        history.append({"round": "finer grid", "cost": None, "broke": "what fits on the wider grid"})
+        history.append({"round": "finer grid", "cost": None, "broke": BROKE})
         return trial, solution
     progress(0.4, 1.0, f"on a finer grid: {plain(trial.wanted, found.x)}")
     try:

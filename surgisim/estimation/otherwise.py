@@ -223,7 +223,7 @@ def shares(solution: Solution, wanted: Search, found: list[Answer], region: np.n
 
     region: which errors may go together, (R,) int. Where parts of the tissue ask for different numbers, differences of
     the misfit tell less than they say; and that a lens, a slope or a rim fits a little better is no evidence for it:
-    the shape of a simulated motion is not known that well (docs/numbers.md).
+    the shape of a simulated motion is not known that well (DEVIATIONS.md, "What is taken for granted").
     """
     cost, unit = cost_of(solution.residual, solution.x, wanted), _unit(solution, wanted, region)
     odds = [np.exp(min(0.5 * (cost - a.cost) / unit, MOST_ODDS)) if a.one.rival else 0.0 for a in found]

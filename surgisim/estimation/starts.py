@@ -47,7 +47,7 @@ class Freed:
     @property
     def since(self) -> int:
         """A frame before it, however much earlier it may begin."""
-        return int(self.let_go + min(OPENING))
+        return max(0, int(self.let_go + min(OPENING)))
 
 
 def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np.ndarray:
@@ -98,7 +98,7 @@ def valleys(
 ) -> Iterator[tuple[float, np.ndarray]]:
     """Cost and place of every modulus that fits better than the next ones, at one damping, as read off one ring-down.
 
-    None where that cannot be simulated.
+    Nothing where that cannot be simulated.
     """
     wanted = trial.wanted
     low, high = wanted.bounds

@@ -32,6 +32,8 @@ def test_the_longest_stretch_without_a_grip_is_read():
     active[0, 5:10] = active[0, 13:20] = True
     motion = SimpleNamespace(active=active, late=np.array([0.3]))
     assert freed(motion, 40) == Freed(19.3, 39)
+    assert Freed(let_go=0.2, last=5).since == 0
+    assert Freed(let_go=-1.0, last=5).since == 0
     assert freed(SimpleNamespace(active=np.ones((1, 8), bool), late=np.zeros(1)), 8) is None
 
 
