@@ -18,7 +18,7 @@ demo: setup
 	@$(BIN)/surgisim $(if $(VIDEO),run "$(VIDEO)",demo) --out "$(OUT)" $(ARGS)
 
 test: setup
-	@$(BIN)/python -m pytest $(ARGS)
+	@$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 lint: setup
 	$(BIN)/ruff check .

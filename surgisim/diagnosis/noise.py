@@ -17,6 +17,7 @@ constant. Projecting those out of the whitened vectors is the exact marginal lik
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -84,6 +85,12 @@ class Noise:
             return self
         length, keep = max(self.length, SMOOTH), max(self.keep_shared, LASTS)
         return replace(self, shared=self.shared + missing, length=length, keep_shared=keep)
+
+    def told(self) -> dict[str, Any]:
+        """Its numbers as a diagnosis holds them: means over the points; `axes` along x, y and z, None if alike."""
+        numbers = {k: float(np.mean(v)) for k, v in vars(self).items() if k != "axes"}
+        axes = None if self.axes is None else self.axes.mean(0).tolist()
+        return numbers | {"axes": axes, "sigma": self.sigma, "unit": "m"}
 
     def modes(self, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Patterns over the points, (K, K), orthonormal columns, and each one's shared and camera variance, (K,)."""

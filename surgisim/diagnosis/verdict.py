@@ -100,8 +100,7 @@ def write(
         goodness=goodness(case, said_of.after),
         untold=list(case.base.untold),
         base=base_numbers(case.base),
-        noise={k: (float(v) if np.ndim(v) == 0 else float(np.mean(v))) for k, v in vars(noise).items()}
-        | {"sigma": noise.sigma, "unit": "m"},
+        noise=noise.told(),
         global_test={
             "log_evidence": float(laws[ranked[0]].evidence),
             "nulls": np.round(highest(laws), 3).tolist(),

@@ -1,5 +1,6 @@
 """Tracking noise is told from quiet frames, and whitened away."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -46,6 +47,14 @@ def test_depth_that_is_less_sure_weighs_less(drawn):
     whiten = whitener(uneven, rest, seen)
     other = np.random.default_rng(9).standard_normal(field.shape)
     assert whiten(other) @ whiten(field) == pytest.approx((other * whiten.back(whiten(field))).sum())
+
+
+@pytest.mark.parametrize("axes", [None, np.tile(AXES, (50, 1))])
+def test_it_is_told_in_plain_numbers_whether_axes_are_alike_or_not(drawn, axes):
+    _, noise, *_ = drawn
+    told = replace(noise, axes=axes).told()
+    assert json.loads(json.dumps(told)) == told
+    assert told["axes"] == (None if axes is None else pytest.approx(AXES.tolist()))
 
 
 def test_errors_that_still_frames_do_not_show_are_at_least_as_large_as_said(drawn):
