@@ -6,6 +6,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
@@ -20,14 +21,14 @@ from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.carrying import carrying, course
 from surgisim.estimation.damping import numerical_damping
-from surgisim.estimation.gauss_newton import Solution, derivative
+from surgisim.estimation.finer import finely
+from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.lay import Laying, upright
 from surgisim.estimation.light_along_tracks import brightness, spoilt
 from surgisim.estimation.model_error import model_error
 from surgisim.estimation.observation import PHASES, fitted_frames, observe, phases
 from surgisim.estimation.otherwise import (
-    Answer,
     Otherwise,
     answers,
     better,
@@ -36,7 +37,6 @@ from surgisim.estimation.otherwise import (
     otherwise,
     resolution,
     rivals,
-    settled,
     shares,
 )
 from surgisim.estimation.picture import picture_loss
@@ -46,7 +46,6 @@ from surgisim.estimation.rounds import (
     choose_support,
     descend,
     number,
-    plain,
     settle_grip,
     settle_pull,
     windows,
@@ -57,7 +56,6 @@ from surgisim.estimation.stated import by_phase
 from surgisim.estimation.support import EDGES, Support, open_depth
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
-from surgisim.mpm.simulator import Breakdown
 from surgisim.physics.catalogue import choose, columns
 from surgisim.physics.place import Place
 from surgisim.problem import Problem
@@ -66,10 +64,6 @@ Say = Callable[[float, float, str], None]
 
 FLOOR = 0.01
 """Least standard deviation of a tracked displacement, as a share of the grid's spacing."""
-FINER, NEARLY = 1.5, 1e-3
-"""How many times finer the grid is that a fit ends on, and the share of its cost that a step must win there at last."""
-BROKE = "what fits on the wider grid cannot be simulated on a finer one"
-"""What `history` says where a fit stays on the wider grid."""
 STILL = 0.5
 """Motion below which a track is taken to stand still [px]."""
 
@@ -157,23 +151,29 @@ def estimate(
         x = choose_start(trial, x, history, progress)
         ends = windows(fitted, phase, settings.first_window)
         trial, solution = descend(trial, x, ends, settings, history, progress)
-        model, gridless = {}, np.zeros(len(x))
+        model: dict[str, np.ndarray] = {}
         if trial.laying:
             ask = partial(otherwise, camera=camera, points=carried, make=make)
-            trial, solution, model, gridless = _weighed(trial, solution, ask, ends[-1:], settings, history, progress)
+            trial, solution, model = _weighed(trial, solution, ask, ends[-1:], settings, history, progress)
+        table = _known(trial, solution, model, phase, settings)
+        wide, wide_x = trial, solution.x
+        if trial.laying and any(q["told"] for q in table.values()):
+            trial, solution = finely(trial, solution, history, _part(progress, 0.7, 0.8))
+            shift = solution.x - wide_x
+            table = _known(trial, solution, model | {"grid": np.outer(shift, shift)}, phase, settings)
         x = solution.x
-        tissue = np.clip(x + gridless, *trial.wanted.bounds)
-        table = identifiability(
-            replace(solution, x=tissue), trial.wanted, phase_of=trial.of_frames(phase), phase_names=PHASES,
-            density=settings.density, length=trial.depth(tissue), independent=INDEPENDENT, region=trial.regions,
-            model=model,
-        )  # fmt: skip
+    else:
+        wide, wide_x = trial, x
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
     support = Support(trial.depth(x), *edge)
-    values, trial = trial.wanted.values(x), trial.settled(x)
-    x, theta, refined = x[: len(wanted.free)], trial.theta(values), None
+    coarse, uniform = wide.settled(wide_x), wide.wanted.values(wide_x)
+    values, trial = trial.wanted.values(x), coarse if trial is wide else trial.settled(x)
+    theta, refined = trial.theta(values), None
     if settings.enabled:
-        theta, refined = _refined(trial, values, scene, frames, masks, camera, settings, progress)
+        # A field shapes what is slow, which the wider grid shows as well, at a fifth of the cost.
+        field, refined = _refined(coarse, uniform, scene, frames, masks, camera, settings, progress)
+        theta = _brought(field, coarse, uniform, trial, values)
+    x = x[: len(wanted.free)]
     trial, run = settle_grip(trial, x, history, theta)
     prepared, laid = trial.bodies[0], trial.bodies[0].body
     path = trial.drive(values, stiffest=prepared.stiffest(theta))
@@ -260,22 +260,24 @@ def _weighed(
     settings: Estimation,
     history: list,
     progress: Say,
-) -> tuple[Trial, Solution, dict[str, np.ndarray], np.ndarray]:
+) -> tuple[Trial, Solution, dict[str, np.ndarray]]:
     """The fit held against its rivals, going on from a far more probable one, and against what it takes for granted.
 
-    With it the covariance that each adds to the numbers in search space, by its name, and how far the tissue's own
-    numbers lie from those that fit on this grid, (M,).
+    With it the covariance that each adds to the numbers in search space, by its name.
     """
     first, wanted = trial, trial.wanted
-    found = answers(solution, list(rivals(trial, solution.x)), _part(progress, 0.55, 0.63))
+    found = answers(solution, list(rivals(trial, solution.x)), _part(progress, 0.55, 0.63), trial.regions)
     chosen = better(solution, wanted, found, trial.regions)
     if chosen:
-        begun = Answer(Otherwise("as first found", first, rival=True), solution.x, None, found[0].cost)
+        begun = replace(found[0], one=Otherwise("as first found", first, rival=True), x=solution.x)
         found = [a for a in found if a not in (chosen, found[0])] + [begun] * (chosen is not found[0])
-        trial, solution = descend(chosen.one.trial, chosen.x, ends, settings, history, progress)
+        trial, solution = descend(
+            chosen.one.trial, chosen.x, ends, settings, history, progress, jacobian=chosen.jacobian
+        )
     else:
         found = found[1:]
-    here, *others = answers(solution, list(ask(trial, solution.x)), _part(progress, 0.63, 0.7))
+    ask_here = list(ask(trial, solution.x))
+    here, *others = answers(solution, ask_here, _part(progress, 0.63, 0.7), trial.regions)
     if here.residual is not None:
         solution = Solution(here.x, here.residual, solution.jacobian)
     found += others
@@ -283,43 +285,37 @@ def _weighed(
     for a, share in table:
         history.append({"round": "otherwise", "about": a.one.about, "share": share, "misfit": number(a.cost)})
     shifts = {a.one.about: (a.x - solution.x, share) for a, share in table}
-    model = {about: share * np.outer(d, d) for about, (d, share) in shifts.items()}
-    trial, fine = _finely(trial, solution, history, _part(progress, 0.7, 0.8))
-    off, doubt = on_no_grid(trial, fine.x)
-    model |= {
-        "grid": np.outer(fine.x - solution.x, fine.x - solution.x),
-        "periods on the grid": doubt,
-        "particles": resolution(trial, fine.x),
-        "decay on the grid": decay(trial, fine.x),
-    }
-    return trial, fine, model, off
+    return trial, solution, {about: share * np.outer(d, d) for about, (d, share) in shifts.items()}
 
 
-def _finely(trial: Trial, solution: Solution, history: list, progress: Say) -> tuple[Trial, Solution]:
-    """The fit brought to a finer grid, on which a ring-down's shorter waves run as fast as they should.
+def _known(trial: Trial, solution: Solution, model: dict, phase: np.ndarray, settings: Estimation) -> dict:
+    """What a solution tells of the tissue itself: what its grid gets wrong is taken off, and counts as not known."""
+    x = solution.x
+    if trial.laying:
+        off, doubt = on_no_grid(trial, x)
+        model = model | {
+            "periods on the grid": doubt,
+            "particles": resolution(trial, x),
+            "decay on the grid": decay(trial, x),
+        }
+        x = np.clip(x + off, *trial.wanted.bounds)
+    return identifiability(
+        replace(solution, x=x), trial.wanted, phase_of=trial.of_frames(phase), phase_names=PHASES,
+        density=settings.density, length=trial.depth(x), independent=INDEPENDENT, region=trial.regions, model=model,
+    )  # fmt: skip
 
-    First by steps of the derivative that the wider grid gave, then of its own. Where that cannot be simulated it stays
-    as it was, with a line in `history`.
+
+def _brought(field: np.ndarray, coarse: Trial, uniform: Values, trial: Trial, values: Values) -> np.ndarray:
+    """A field over the particles of one settled trial, (P, M), that was found beside `uniform`, as one over another's.
+
+    Each particle there is as many times stiffer than `values` as the nearest here is than `uniform`.
     """
-    fine = replace(trial, laying=trial.laying.finer(FINER))
-    change = on_no_grid(fine, solution.x)[0] - on_no_grid(trial, solution.x)[0]
-    begin = np.clip(solution.x - change, *trial.wanted.bounds)
-    progress(0.0, 1.0, "on a finer grid")
-    found = settled(Otherwise("finer grid", fine, begin=begin), solution)
-    if found.residual is None:
-        # A finer grid follows a sharper fold, and can turn inside out where a wider one does not.
-        history.append({"round": "finer grid", "cost": None, "broke": BROKE})
-        return trial, solution
-    progress(0.4, 1.0, f"on a finer grid: {plain(trial.wanted, found.x)}")
-    try:
-        J = derivative(fine.together, found.x, found.residual, trial.wanted.differences, trial.wanted.bounds)
-    except Breakdown as breakdown:
-        history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
-        return trial, solution
-    here = Solution(found.x, found.residual, J)
-    found = settled(Otherwise("finer grid", fine, begin=found.x), here, enough=NEARLY)
-    history.append({"round": "finer grid", "cost": number(found.cost)} | plain(trial.wanted, found.x))
-    return fine, replace(here, x=found.x, residual=found.residual)
+    even = coarse.theta(uniform)
+    if trial is coarse:
+        return field
+    ratio = np.where(even != 0, field / np.where(even != 0, even, 1.0), 1.0)
+    near = cKDTree(coarse.bodies[0].body.rest).query(trial.bodies[0].body.rest)[1]
+    return trial.theta(values) * ratio[near]
 
 
 def _part(progress: Say, begin: float, end: float) -> Say:

@@ -39,6 +39,7 @@ def gauss_newton(
     workers: int,
     said: Callable[[int, np.ndarray, float], None] = lambda *_: None,
     together: Callable[[list[np.ndarray]], list[np.ndarray | None]] | None = None,
+    jacobian: np.ndarray | None = None,
 ) -> Solution:
     """Minimise share sum huber(r(x)) + sum ((x - prior) / spread)^2 by Levenberg-Marquardt.
 
@@ -46,7 +47,7 @@ def gauss_newton(
 
     residual(x, worker) may be called from `workers` threads at once, each with its own number; it
     returns None where x cannot be simulated, which only a trial step may meet. together(xs) gives the residuals of
-    several x at once, where that is quicker.
+    several x at once, where that is quicker. jacobian: a derivative, (R, M), nearly right at x, to begin with.
     Nocedal and Wright, Numerical optimization, 2nd ed. (2006), section 10.3; between derivatives by differences, which
     cost a simulation a number, Broyden's update (ibid., section 11.1).
     """
@@ -68,7 +69,8 @@ def gauss_newton(
             "estimation: the simulation breaks down at its start values. "
             "Start from stiffer tissue (estimation.start), or check the grip."
         )
-    cost, J, fresh = cost_of(r, x), jacobian_at(x, r), True
+    cost, fresh = cost_of(r, x), jacobian is None
+    J = jacobian_at(x, r) if fresh else jacobian
     said(0, x, cost)
     for iteration in range(1, iterations + 1):
         best = None
@@ -109,17 +111,20 @@ def derivative(
     r: np.ndarray,
     differences: np.ndarray,
     bounds: tuple[np.ndarray, np.ndarray],
+    by: np.ndarray | None = None,
 ) -> np.ndarray:
     """Derivative of the residuals r, (R,), at x, (M,), by differences of these sizes, (R, M).
 
-    together(xs): the residuals of several x. Raises Breakdown where neither side of a number can be simulated.
+    together(xs): the residuals of several x. by: the numbers by which it is taken, (N,) int, for (R, N); all if None.
+    Raises Breakdown where neither side of a number can be simulated.
     """
     low, high = bounds
-    side = np.where(x + differences <= high, 1.0, -1.0) * differences
-    shifted = together(list(x + np.diag(side)))
+    way = np.eye(len(x)) if by is None else np.eye(len(x))[by]
+    side = way @ (np.where(x + differences <= high, 1.0, -1.0) * differences)
+    shifted = together(list(x + side[:, None] * way))
     for m in [m for m, s in enumerate(shifted) if s is None]:
         side[m] = -side[m]
-        (shifted[m],) = together([np.clip(x + side[m] * np.eye(len(x))[m], low, high)])
+        (shifted[m],) = together([np.clip(x + side[m] * way[m], low, high)])
     if any(s is None for s in shifted):
         raise Breakdown(
             "estimation: the simulation breaks down a small step beside the current parameters. "

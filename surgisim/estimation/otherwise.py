@@ -52,6 +52,8 @@ DECAY = 0.42
 .104, .047 and .026 with 2, 3 and 4 cells (docs/verification.md, "Decay of a viscous rod")."""
 STEPS, ENOUGH = 4, 0.01
 """Most steps to where a fit lies otherwise, and the share of its cost that one must win for another."""
+HOPELESS = 10.0
+"""Logarithm of how many times less probable a rival is than the fit that is not followed any further."""
 AS_IT_IS = "nothing"
 """What is changed where a fit is only brought to where these steps would bring it."""
 
@@ -84,6 +86,8 @@ class Answer:
     residual: np.ndarray | None
     """Weighted, (R,); None where it cannot be simulated."""
     cost: float
+    jacobian: np.ndarray
+    """The derivative by which it was reached, as the steps there have corrected it, (R, M)."""
 
 
 def rivals(trial: Trial, x: np.ndarray) -> Iterator[Otherwise]:
@@ -198,12 +202,17 @@ def _laws(trial: Trial, make: Make) -> Iterator[Otherwise]:
                 yield Otherwise(rival, replace(trial, wanted=changed, laying=laying), rival=True)
 
 
-def answers(solution: Solution, changed: list[Otherwise], say: Say) -> list[Answer]:
-    """Where the fit lies with each thing changed, in their order; say(done, of, what)."""
+def answers(solution: Solution, changed: list[Otherwise], say: Say, region: np.ndarray) -> list[Answer]:
+    """Where the fit lies with each thing changed, in their order; say(done, of, what), region: as for `shares`.
+
+    Rivals are followed as long as they may come near.
+    """
     said = itertools.count(1)
+    wanted = changed[0].trial.wanted
+    near = cost_of(solution.residual, solution.x, wanted) + 2 * HOPELESS * _unit(solution, wanted, region)
 
     def of(one: Otherwise, worker: int) -> Answer:
-        found = settled(one, solution, worker)
+        found = settled(one, solution, worker, near=near if one.rival else np.inf)
         say(next(said), len(changed), f"if it were otherwise: {one.about}")
         return found
 
@@ -242,11 +251,14 @@ def _weights(r: np.ndarray) -> np.ndarray:
     return INDEPENDENT / np.maximum(1.0, np.abs(r) / WIDTH)
 
 
-def settled(one: Otherwise, solution: Solution, worker: int = 0, enough: float = ENOUGH) -> Answer:
+def settled(
+    one: Otherwise, solution: Solution, worker: int = 0, enough: float = ENOUGH, near: float = np.inf
+) -> Answer:
     """Where a fit near a solution lies otherwise, by a few steps of the derivative that was taken there.
 
     Each step corrects the derivative by what it met (Broyden's update, as in `gauss_newton`). enough: the share of the
-    cost that a step must win for another.
+    cost that a step must win for another. near: a cost that as many more steps as are left, each as good as the last
+    one, must reach, or none is made.
     """
     trial, wanted, J = one.trial, one.trial.wanted, solution.jacobian
     low, high = wanted.bounds
@@ -254,9 +266,9 @@ def settled(one: Otherwise, solution: Solution, worker: int = 0, enough: float =
     free = np.flatnonzero(np.ones(len(x), bool) if one.open is None else one.open)
     r = trial.residual(x, worker)
     if r is None:
-        return Answer(one, x, r, np.inf)
-    cost, damping = cost_of(r, x, wanted), 0.01
-    for _ in range(STEPS):
+        return Answer(one, x, r, np.inf, J)
+    cost, damping, gained = cost_of(r, x, wanted), 0.01, np.inf
+    for left in reversed(range(STEPS)):
         w = _weights(r)
         hessian = (J * w[:, None]).T @ J + np.diag(1 / wanted.spread**2)
         g = J.T @ (w * r) + (x - wanted.start) / wanted.spread**2
@@ -272,10 +284,12 @@ def settled(one: Otherwise, solution: Solution, worker: int = 0, enough: float =
         if moved.any():
             J = J + np.outer((there - r - J @ moved) / (moved @ moved), moved)
         if reached < cost:
-            gained = (cost - reached) / cost
+            gained = cost - reached
             x, r, cost, damping = at, there, reached, 0.1 * damping
-            if gained < enough:
+            if gained < enough * (cost + gained):
                 break
         else:
             damping *= 30
-    return Answer(one, x, r, cost)
+        if cost - left * gained > near:
+            break
+    return Answer(one, x, r, cost, J)

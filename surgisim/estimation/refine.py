@@ -19,6 +19,8 @@ from surgisim.mpm.simulator import Breakdown, Simulator
 
 RATE = 0.08
 """Adam's step in the logarithm."""
+PATIENCE = 3
+"""Steps in a row without a better fit of the kept frames after which no more are made."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ def refine(
     own, other = np.repeat(pairs[:, 0], neighbours), pairs[:, 1:].ravel()
     s = np.zeros((len(theta), len(columns)))
     first, second = np.zeros_like(s), np.zeros_like(s)
-    best_s, best_judged, history = s, np.inf, []
+    best_s, best_judged, best_k, history = s, np.inf, 0, []
     begun = np.inf
     for k in range(iterations + 1):
         now = theta.copy()
@@ -77,8 +79,8 @@ def refine(
         progress(k, iterations, f"refinement {k}/{iterations}, misfit {track:.3f}, on kept frames {judged:.3f}")
         begun = judged if k == 0 else begun
         if judged < best_judged:
-            best_s, best_judged = s.copy(), judged
-        if k == iterations:
+            best_s, best_judged, best_k = s.copy(), judged, k
+        if k == iterations or k - best_k >= PATIENCE:
             break
         gradient = simulator.gradient(now, drive, run, u_bar).theta[:, columns] * now[:, columns]
         difference = s[own] - s[other]

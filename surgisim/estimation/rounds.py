@@ -158,11 +158,13 @@ def settle_pull(
 
 
 def descend(
-    trial: Trial, x: np.ndarray, ends: list[int], settings: Estimation, history: list, say: Say
-) -> tuple[Trial, Solution]:
+    trial: Trial, x: np.ndarray, ends: list[int], settings: Estimation, history: list, say: Say,
+    jacobian: np.ndarray | None = None,
+) -> tuple[Trial, Solution]:  # fmt: skip
     """Gauss-Newton from x over windows that end at these frames, the last at the last fitted one.
 
-    Where a firmer grip cannot be simulated, a softer one holds from there on.
+    Where a firmer grip cannot be simulated, a softer one holds from there on. jacobian: a derivative, (R, M), that is
+    nearly right there already, where there is but one window.
     """
     wanted = trial.wanted
     for k, last in enumerate(ends):
@@ -193,6 +195,7 @@ def descend(
                     workers=WORKERS,
                     said=said,
                     together=partial(trial.together, last=last),
+                    jacobian=jacobian,
                 )
             except Breakdown as breakdown:
                 trial = _softer(trial, history, str(breakdown))

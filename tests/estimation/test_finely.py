@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from surgisim.estimation import fit
+from surgisim.estimation import finer, fit
 from surgisim.estimation.gauss_newton import Solution
 
 
@@ -24,10 +24,32 @@ def test_a_finer_grid_that_breaks_down_leaves_the_fit_as_it_was(monkeypatch):
     laying = SimpleNamespace(finer=lambda times: f"{times} times finer")
     wanted = SimpleNamespace(bounds=(np.full(2, -9.0), np.full(2, 9.0)), spread=np.ones(2))
     trial = Breaking(laying, wanted)
-    monkeypatch.setattr(fit, "on_no_grid", lambda trial, x: (np.zeros(2), np.zeros((2, 2))))
+    monkeypatch.setattr(finer, "on_no_grid", lambda trial, x: (np.zeros(2), np.zeros((2, 2))))
     solution, history = Solution(np.ones(2), np.zeros(3), np.zeros((3, 2))), []
-    kept, same = fit._finely(trial, solution, history, lambda *_: None)
+    kept, same = finer.finely(trial, solution, history, lambda *_: None)
     assert kept is trial
     assert same is solution
     assert history[0]["round"] == "finer grid"
     assert "finer one" in history[0]["broke"]
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A settled trial of a body whose uniform columns are `theta`'s."""
+
+    bodies: list
+
+    def theta(self, values):
+        return np.tile([values["corotated"]["E"], 0.0], (len(self.bodies[0].body.rest), 1))
+
+
+def laid(places):
+    return Laid([SimpleNamespace(body=SimpleNamespace(rest=np.array(places, float)))])
+
+
+def test_a_field_is_as_many_times_stiffer_at_the_same_place_on_another_grid():
+    coarse, fine = laid([[0, 0, 0], [1, 0, 0]]), laid([[0.1, 0, 0], [0.4, 0, 0], [0.9, 0, 0]])
+    field = np.array([[2000.0, 0.0], [500.0, 0.0]])
+    at = {E: {"corotated": {"E": E}} for E in (1000.0, 900.0)}
+    brought = fit._brought(field, coarse, at[1000.0], fine, at[900.0])
+    assert brought.tolist() == [[1800.0, 0.0], [1800.0, 0.0], [450.0, 0.0]]

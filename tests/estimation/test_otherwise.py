@@ -44,7 +44,7 @@ def test_what_was_taken_for_granted_counts_whole():
     noise -= trial.slope @ np.linalg.lstsq(trial.slope, noise, rcond=None)[0]
     other = away(trial, 0.3, 0.0, -0.2)
     for off in (other.off, other.off + noise):
-        [answer] = answers(solution, [Otherwise("lens", replace(other, off=off))], silent)
+        [answer] = answers(solution, [Otherwise("lens", replace(other, off=off))], silent, REGION)
         assert answer.x - solution.x == pytest.approx([0.3, 0.0, -0.2], rel=0.02, abs=1e-3)
         assert shares(solution, trial.wanted, [answer], REGION) == [1.0]
 
@@ -60,7 +60,7 @@ def test_a_misfit_says_less_of_rivals_where_regions_pull_the_numbers_apart():
     for name, off in (("agreeing", noise * np.sqrt(np.mean(apart**2))), ("apart", apart)):
         solution = Solution(trial.wanted.start, off, trial.slope)
         rival = Otherwise("rival", replace(trial, off=1.05 * off), rival=True)
-        [share[name]] = shares(solution, trial.wanted, answers(solution, [rival], silent), REGION)
+        [share[name]] = shares(solution, trial.wanted, answers(solution, [rival], silent, REGION), REGION)
     assert share["agreeing"] < share["apart"] < 0.5
 
 
@@ -76,6 +76,7 @@ def test_rivals_share_by_how_well_they_fit():
             Otherwise("poor", replace(trial, off=trial.off + 20 * worse), rival=True),
         ],
         silent,
+        REGION,
     )  # fmt: skip
     as_good, poor = shares(solution, trial.wanted, found, REGION)
     assert as_good == pytest.approx(0.5, abs=0.02)
@@ -86,8 +87,33 @@ def test_a_number_that_is_not_fitted_anew_stays():
     trial, solution = fitted()
     begin = trial.wanted.start + np.array([0.5, 0.0, 0.0])
     one = Otherwise("stiffer", trial, rival=True, begin=begin, open=np.array([False, True, True]))
-    [answer] = answers(solution, [one], silent)
+    [answer] = answers(solution, [one], silent, REGION)
     assert (answer.x - solution.x)[0] == pytest.approx(0.5)
+
+
+@dataclass(frozen=True)
+class Counted(Linear):
+    """The same, counting how often it is asked."""
+
+    asked: list
+
+    def residual(self, x, worker=0, last=None):
+        self.asked.append(x)
+        return super().residual(x)
+
+
+def test_a_rival_that_cannot_come_near_is_left_early():
+    trial, _ = fitted()
+    noise = np.random.default_rng(5).normal(size=COUNT)
+    noise -= trial.slope @ np.linalg.lstsq(trial.slope, noise, rcond=None)[0]
+    solution, bent = Solution(trial.wanted.start, noise, trial.slope), replace(trial, off=4 * noise)
+    asked = {}
+    for rival in (True, False):
+        counted = Counted(bent.wanted, 0.5 * bent.slope, bent.off, [])
+        begin = trial.wanted.start + np.array([0.8, 0.1, 0.4])
+        answers(solution, [Otherwise("other", counted, rival=rival, begin=begin)], silent, REGION)
+        asked[rival] = len(counted.asked)
+    assert asked[True] < asked[False]
 
 
 def test_a_fit_gives_way_to_a_far_more_probable_one_only():
@@ -95,9 +121,9 @@ def test_a_fit_gives_way_to_a_far_more_probable_one_only():
     off = np.random.default_rng(2).normal(size=COUNT)
     worse = Solution(trial.wanted.start, 1.5 * off, trial.slope)
     changed = [Otherwise("edge", replace(trial, off=off), rival=True)]
-    assert better(worse, trial.wanted, answers(worse, changed, silent), REGION).one is changed[0]
+    assert better(worse, trial.wanted, answers(worse, changed, silent, REGION), REGION).one is changed[0]
     same = Solution(trial.wanted.start, off, trial.slope)
-    assert better(same, trial.wanted, answers(same, changed, silent), REGION) is None
+    assert better(same, trial.wanted, answers(same, changed, silent, REGION), REGION) is None
 
 
 def silent(*_):

@@ -1,0 +1,56 @@
+"""A fit brought to a finer grid, on which a ring-down's shorter waves run as fast as they should."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from surgisim.estimation.gauss_newton import Solution, derivative
+from surgisim.estimation.otherwise import Otherwise, on_no_grid, settled
+from surgisim.estimation.rounds import number, plain
+from surgisim.estimation.search import Search
+from surgisim.estimation.trial import Trial
+from surgisim.mpm.simulator import Breakdown
+
+FINER, NEARLY = 1.5, 1e-3
+"""How many times finer the grid is that a fit ends on, and the share of its cost that a step must win there at last."""
+BROKE = "what fits on the wider grid cannot be simulated on a finer one"
+"""What `history` says where a fit stays on the wider grid."""
+
+Say = Callable[[float, float, str], None]
+
+
+def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[Trial, Solution]:
+    """The fit on a finer grid; the same one, with a line in `history`, where that cannot be simulated.
+
+    The first steps go by the wider grid's derivative. Then the laws' numbers and moments of release get one of their
+    own: those pace a swing, and a grid changes the pace. Of all else, which shapes it, the wider grid's serves on: both
+    grids' fits swing as the recording does.
+    """
+    fine = replace(trial, laying=trial.laying.finer(FINER))
+    wanted = trial.wanted
+    change = on_no_grid(fine, solution.x)[0] - on_no_grid(trial, solution.x)[0]
+    begin = np.clip(solution.x - change, *wanted.bounds)
+    say(0.0, 1.0, "on a finer grid")
+    found = settled(Otherwise("finer grid", fine, begin=begin), solution)
+    if found.residual is None:
+        # A finer grid follows a sharper fold, and can turn inside out where a wider one does not.
+        history.append({"round": "finer grid", "cost": None, "broke": BROKE})
+        return trial, solution
+    say(0.4, 1.0, f"on a finer grid: {plain(wanted, found.x)}")
+    paces, J = pacing(wanted), solution.jacobian.copy()
+    try:
+        J[:, paces] = derivative(fine.together, found.x, found.residual, wanted.differences, wanted.bounds, paces)
+    except Breakdown as breakdown:
+        history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
+        return trial, solution
+    here = Solution(found.x, found.residual, J)
+    found = settled(Otherwise("finer grid", fine, begin=found.x), here, enough=NEARLY)
+    history.append({"round": "finer grid", "cost": number(found.cost)} | plain(wanted, found.x))
+    return fine, replace(here, x=found.x, residual=found.residual)
+
+
+def pacing(wanted: Search) -> np.ndarray:
+    """Which numbers set when and how fast tissue swings, (N,) int."""
+    laws = len(wanted.free)
+    return np.array([k for k, name in enumerate(wanted.names) if k < laws or name.endswith(".release")], int)
