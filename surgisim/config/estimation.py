@@ -33,6 +33,8 @@ class Estimation(Settings):
     """'law.parameter' entries that keep their start value [-]."""
     support: bool = True
     """Whether to choose how deep and where the body is held by what fits the pull best [-]."""
+    seen_rim: bool = True
+    """Whether the edge of the picture may be carried as it is seen to go, where that fits far better elsewhere [-]."""
     carrying: bool = True
     """Whether what is open of the grips (how far they come nearer, size, release) is fitted with the laws [-]."""
     brightness: bool = True

@@ -23,9 +23,9 @@ Say = Callable[[float, float, str], None]
 def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[Trial, Solution]:
     """The fit on a finer grid; the same one, with a line in `history`, where that cannot be simulated.
 
-    The first steps go by the wider grid's derivative. Then the laws' numbers and moments of release get one of their
-    own: those pace a swing, and a grid changes the pace. Of all else, which shapes it, the wider grid's serves on: both
-    grids' fits swing as the recording does.
+    The first steps go by the wider grid's derivative. Then what a grid changes most gets one of its own: the laws'
+    numbers and moments of release, which pace a swing, and how far a grip comes nearer. Of all else the wider grid's
+    serves on: both grids' fits swing as the recording does.
     """
     fine = replace(trial, laying=trial.laying.finer(FINER))
     wanted = trial.wanted
@@ -38,9 +38,9 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
         history.append({"round": "finer grid", "cost": None, "broke": BROKE})
         return trial, solution
     say(0.4, 1.0, f"on a finer grid: {plain(wanted, found.x)}")
-    paces, J = pacing(wanted), solution.jacobian.copy()
+    own, J = changed(wanted), solution.jacobian.copy()
     try:
-        J[:, paces] = derivative(fine.together, found.x, found.residual, wanted.differences, wanted.bounds, paces)
+        J[:, own] = derivative(fine.together, found.x, found.residual, wanted.differences, wanted.bounds, own)
     except Breakdown as breakdown:
         history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
         return trial, solution
@@ -50,7 +50,7 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
     return fine, replace(here, x=found.x, residual=found.residual)
 
 
-def pacing(wanted: Search) -> np.ndarray:
-    """Which numbers set when and how fast tissue swings, (N,) int."""
-    laws = len(wanted.free)
-    return np.array([k for k, name in enumerate(wanted.names) if k < laws or name.endswith(".release")], int)
+def changed(wanted: Search) -> np.ndarray:
+    """The numbers whose derivative a grid changes most, (N,) int."""
+    laws, ends = len(wanted.free), (".release", ".toward")
+    return np.array([k for k, name in enumerate(wanted.names) if k < laws or name.endswith(ends)], int)

@@ -41,6 +41,7 @@ from surgisim.estimation.otherwise import (
 )
 from surgisim.estimation.picture import picture_loss
 from surgisim.estimation.refine import Refined, refine
+from surgisim.estimation.rim import seen_rim
 from surgisim.estimation.rounds import (
     INDEPENDENT,
     choose_support,
@@ -141,11 +142,14 @@ def estimate(
     x, history, table = trial.wanted.start, [], {}
     progress = _onward(progress)
     trial, run = settle_grip(trial, x, history)
-    before = {name: trial.stand(x)[0].observation.error(run.u, at) for name, at in parts.items()}
-    before_each = trial.stand(x)[0].observation.each(run.u, held_out)
+    default = trial.stand(x)[0].observation
     if trial.laying:
-        trial, x = choose_support(trial, phase, history, progress)
+        rim = seen_rim(tracks, motion, camera, body.spacing) if settings.seen_rim else None
+        trial, x = choose_support(trial, rim, phase, history, progress)
         trial, _ = settle_grip(trial, x, history)
+        default = replace(default, weight=np.where(trial.observation.weight > 0, default.weight, 0.0))
+    before = {name: default.error(run.u, at) for name, at in parts.items()}
+    before_each = default.each(run.u, held_out)
     if settings.enabled and wanted.free:
         x = settle_pull(trial, x, phase, settings, history, progress)
         x = choose_start(trial, x, history, progress)
@@ -165,7 +169,7 @@ def estimate(
     else:
         wide, wide_x = trial, x
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
-    support = Support(trial.depth(x), *edge)
+    support = Support(trial.depth(x), *edge, len(trial.motion.rim))
     coarse, uniform = wide.settled(wide_x), wide.wanted.values(wide_x)
     values, trial = trial.wanted.values(x), coarse if trial is wide else trial.settled(x)
     theta, refined = trial.theta(values), None

@@ -168,6 +168,10 @@ def in_words(
         f"It moves most like tissue held {support.depth * 1e3:.0f} mm below its surface that goes on "
         f"{support.beyond * 1e3:.0f} mm beyond what is seen and is {'held' if support.rim else 'free'} there.",
     ]
+    if support.patches:
+        parts.append(
+            f"At {support.patches} places along the edge of the picture it is carried as it is seen to go there."
+        )
     if grip < 1:
         parts.append(
             f"Held firmly, the tissue would turn inside out under the grip's path; it is held with {grip:g} of the "

@@ -55,11 +55,11 @@ class Columns:
     flat: bool = False
     """Whether what holds it is flat, as deep below the surface's own plane, instead of following hills and hollows."""
 
-    def laid(self, depth: float, *, rim: bool) -> Body:
-        """The body whose tissue is held from `depth` [m] below the surface on, and at its rim or not."""
+    def laid(self, depth: float, *, rim: bool, base: bool = True) -> Body:
+        """The body whose tissue ends `depth` [m] below the surface, held there or not, and at its rim or not."""
         end = (self._plane if self.flat else self.above) + depth
         free = np.maximum(np.rint((end - self.begin) / self.layer), 0).astype(int)
-        held = max(1, round(BELOW * self.spacing / self.layer))
+        held = max(1, round(BELOW * self.spacing / self.layer)) if base else 0
         kept = free > 0
         high = np.where(kept, (end - self.begin) / np.maximum(free, 1), self.layer)
         count = np.where(kept, free + held, 0)
@@ -161,6 +161,8 @@ class Laying:
     observation: Observation
     make: Callable[[Body, Motion], Prepared]
     """Prepare a body under a motion whose grips it will feel."""
+    base: bool = True
+    """Whether it is held from below."""
     kept: dict = field(default_factory=dict, compare=False)
 
     def ending(self, margin: float, rim: bool) -> Self:
@@ -186,7 +188,7 @@ class Laying:
         if key not in mine:
             if len(mine) >= KEPT:
                 mine.pop(next(iter(mine)))
-            prepared = self.make(self.whole.laid(depth, rim=self.rim), motion)
+            prepared = self.make(self.whole.laid(depth, rim=self.rim, base=self.base), motion)
             mine[key] = prepared, self.observation.carried_by(prepared.simulator)
         return mine[key]
 

@@ -14,6 +14,7 @@ import numpy as np
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.gauss_newton import Solution, gauss_newton, misfit
 from surgisim.estimation.observation import PHASES
+from surgisim.estimation.rim import Rim
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import EDGES, MIDDLE, SHARES
 from surgisim.estimation.trial import WORKERS, Trial, at_once
@@ -33,6 +34,8 @@ GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
 """How firmly instruments may hold, tried in turn."""
 SWINGS = 4
 """How many swings of the tissue the shortest pull lasts at least, where its shape alone is asked for."""
+MOVED = 0.7
+"""Share of the misfit elsewhere below which a body is taken to be moved by what its edge is seen to do."""
 PULLS = 4
 """Most iterations on the shape of a pull, before its release is looked at."""
 SETTLED = 4
@@ -78,11 +81,14 @@ def settle_grip(trial: Trial, x: np.ndarray, history: list, theta=None) -> tuple
     )
 
 
-def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> tuple[Trial, np.ndarray]:
+def choose_support(
+    trial: Trial, rim: Rim | None, phase: np.ndarray, history: list, say: Say
+) -> tuple[Trial, np.ndarray]:
     """The trial with the edge whose pull and hold fit best, and the point to begin from with it.
 
     Depth, Poisson's ratio and how far the grip comes nearer all shape the spread of a load, so none is judged alone:
-    first these on the most expected edge, then the other edges at the best of them.
+    first these on the most expected edge, then the other edges at the best of them, and the best one with what is seen
+    to happen at the edge, where there is a `rim`.
     """
     wanted, start = trial.wanted, unhurried(trial, trial.wanted.start, phase)
     driven = trial.fitted[phase[trial.fitted] < PHASES.index("release")]
@@ -115,7 +121,19 @@ def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> 
     others = [min(costs), *at_once(cost, [(edge, x) for edge in edges[1:]])]
     for edge, c in zip(EDGES, others, strict=True):
         history.append({"round": "edge", "beyond": edge.beyond * wanted.depth.size, "rim": edge.rim, "cost": number(c)})
-    return edges[int(np.argmin(others))], x
+    best = edges[int(np.argmin(others))]
+    if rim is None:
+        return best, x
+    # What says where patches go is no evidence that they do.
+    observation = rim.leaves(best.observation, best.motion)
+    loose = replace(best, observation=observation, laying=replace(best.laying, observation=observation, kept={}))
+    carried = replace(loose, motion=rim.carries(loose.motion))
+    hung = replace(carried, laying=replace(carried.laying, base=False, kept={}))
+    without, *along = at_once(cost, [(loose, x), (carried, x), (hung, x)])
+    for base, c in zip((True, False), along, strict=True):
+        told = {"patches": len(rim.radius), "base": base, "without": number(without), "cost": number(c)}
+        history.append({"round": "edge"} | told)
+    return ((carried, hung)[int(np.argmin(along))] if min(along) < MOVED * without else best), x
 
 
 def settle_pull(

@@ -44,6 +44,8 @@ class Support:
     """How far the tissue goes on beyond what is seen [m]."""
     rim: bool
     """Whether it is held where it ends there."""
+    patches: int = 0
+    """Of the edge of what is seen that go as they are seen to."""
 
 
 def open_depth(columns: Columns) -> Unknown:

@@ -55,6 +55,7 @@ class Trial:
     def stand(self, x: np.ndarray, worker: int = 0) -> tuple["Trial", Motion]:
         """This trial with the body that x asks for, and how that is carried."""
         motion = self.wanted.motion(x, self.motion)
+        motion = replace(motion, rim=self.motion.rim, rim_radius=self.motion.rim_radius)
         if self.laying is None:
             return self, motion
         body, observation = self.laying.at(self.wanted.held_from(x), motion, worker)
@@ -161,7 +162,8 @@ class Trial:
         """The frame up to which nothing moves a body that is laid for a search."""
         laws = choose(self.bodies[0].terms).values()
         calm = all(t.force is None and t.flow is None and t.drive is None and not t.wide for t in laws)
-        if self.laying is None or not calm or any(self.bodies[0].simulator.gravity):
+        moved = any(self.bodies[0].simulator.gravity) or len(self.motion.rim)
+        if self.laying is None or not calm or moved:
             return 0
         return max(0, int(np.argmax(self.motion.active.any(0))) - 1)
 

@@ -43,11 +43,12 @@ class View:
         """How the instruments carry tissue in this view: each grip's whole path is brought along with its start.
 
         A held ball is as large as it was: how large it is, is a number of the fit."""
-        factor = self.factor(found.center_rest)
+        factor, edge = self.factor(found.center_rest), self.factor(found.rim[:, 0])
         return replace(
             found,
             center_rest=found.center_rest * factor,
             position=found.position * factor[:, None],
+            rim=found.rim * edge[:, None],
         )
 
     def alike(self, x: np.ndarray, wanted: Search) -> np.ndarray:

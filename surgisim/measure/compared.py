@@ -27,7 +27,7 @@ class Compared:
     """As the nearest grip that holds; back in its place without one."""
     rigid_px: np.ndarray
     counted: np.ndarray
-    """Point-frames with both, frame 0 left out, (K, T) bool."""
+    """Point-frames with both, frame 0 and what is carried along the edge as it is seen to go left out, (K, T) bool."""
     on_body: np.ndarray
     """(K,) bool."""
     lively: np.ndarray
@@ -41,6 +41,7 @@ def compared(run: Run, to: Reference) -> Compared:
     wanted, wanted_px = from_start(to.xyz), from_start(to.xy)
     counted = to.visible & on_body[:, None] & np.isfinite(wanted).all(-1)
     counted[:, 0] = False
+    counted[run.motion.on_rim(np.where(np.isfinite(to.rest), to.rest, np.inf))] = False
     lively = moving(from_start(to.way), counted, on_body)
     rigid = with_grip(to.motion, to.xyz[:, 0].astype(float))
     return Compared(

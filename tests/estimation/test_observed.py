@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 from slab import slab
-from test_planted import CAMERA
+from slab_clip import CAMERA
 
 from surgisim.estimation.lay import beyond, upright
 from surgisim.estimation.observation import Filmed

@@ -5,6 +5,7 @@ import pytest
 
 from surgisim.artifacts.motion import Motion
 from surgisim.mpm.grip import drive
+from surgisim.problem import Problem
 
 FPS, PER_FRAME, FRAMES = 10.0, 4, 8
 REST = np.array([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]])
@@ -50,3 +51,29 @@ def test_where_it_grips_anew_the_path_that_is_given_counts():
     told = driven(1.8, active=(1, 2, 3, 5, 6), steps=steps).path[1]
     assert told[16] == pytest.approx(4 * WAY)
     assert told[20] == pytest.approx(-2 * WAY)
+
+
+def test_a_patch_of_the_rim_goes_across_the_view_all_the_time_and_is_free_along_it():
+    none = np.zeros((0, FRAMES), bool)
+    way = np.arange(FRAMES)[:, None] * WAY
+    motion = Motion(
+        np.zeros((0, 3)), np.zeros(0), np.zeros((0, FRAMES, 3)), none, np.zeros(0), "found", rim=way[None],
+        rim_radius=np.array([0.01]),
+    )  # fmt: skip
+    found = drive(
+        motion, REST, np.full(2, 1e-9), np.array([False, True]), fps=FPS, per_frame=PER_FRAME, stiffness=3.0, grip=0.1
+    )
+    assert found.member.tolist() == [2, 1]
+    assert found.path[1, ::PER_FRAME] == pytest.approx(way)
+    assert (found.hold == 1).all()
+    # However softly instruments hold.
+    assert found.stiffness[1] == pytest.approx(np.diag([3.0, 3.0, 0.0]))
+
+
+def test_more_patches_than_a_particle_has_bits_for_are_refused():
+    few = Motion(
+        np.zeros((0, 3)), np.zeros(0), np.zeros((0, FRAMES, 3)), np.zeros((0, FRAMES), bool), np.zeros(0), "found",
+        rim=np.zeros((31, FRAMES, 3)), rim_radius=np.full(31, 0.01),
+    )  # fmt: skip
+    with pytest.raises(Problem, match="31 patches of the rim, but at most 30"):
+        drive(few, REST, np.full(2, 1e-9), np.zeros(2, bool), fps=FPS, per_frame=PER_FRAME, stiffness=1.0)

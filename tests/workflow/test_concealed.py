@@ -164,12 +164,12 @@ def test_three_real_cases_go_from_their_seal_to_a_score(tmp_path):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     tree = Tree(tmp_path, tmp_path / "out")
     few = {"points": 80, "spacing": 0.004, "spacing_coarse": 0.005, "only": ["stiff_inclusion", "gravity"]}
-    # Side by side, a processor each: two threads for one diagnosis gain less. One law, and one freely fitted, will do.
+    # Side by side, a processor each: two threads for one diagnosis gain less. One law, on one grid, will do.
     tree.choices = {
         "cases": 3,
         "seed": 4,
         "invent": few | {"snr_low": 3.0, "snr_high": 5.0},
-        "diagnosis": {"workers": 1, "free": 1, "second": False},
+        "diagnosis": {"workers": 1, "free": 0, "second": False, "nulls": 8, "replay": 0.165, "experiment": False},
     }
     assert tree.run("--set-threads", "diagnosis=1", "--keep-going", "blind") == 0
     out = tmp_path / "out" / "blind" / "4"
