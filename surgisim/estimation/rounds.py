@@ -34,7 +34,7 @@ GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
 """How firmly instruments may hold, tried in turn."""
 SWINGS = 4
 """How many swings of the tissue the shortest pull lasts at least, where its shape alone is asked for."""
-MOVED = 0.7
+MOVED = 0.9
 """Share of the misfit elsewhere below which a body is taken to be moved by what its edge is seen to do."""
 PULLS = 4
 """Most iterations on the shape of a pull, before its release is looked at."""
@@ -126,14 +126,16 @@ def choose_support(
         return best, x
     # What says where patches go is no evidence that they do.
     observation = rim.leaves(best.observation, best.motion)
-    loose = replace(best, observation=observation, laying=replace(best.laying, observation=observation, kept={}))
-    carried = replace(loose, motion=rim.carries(loose.motion))
+    alone = replace(best, observation=observation, laying=replace(best.laying, observation=observation, kept={}))
+    carried = replace(alone, motion=rim.carries(alone.motion))
     hung = replace(carried, laying=replace(carried.laying, base=False, kept={}))
-    without, *along = at_once(cost, [(loose, x), (carried, x), (hung, x)])
-    for base, c in zip((True, False), along, strict=True):
-        told = {"patches": len(rim.radius), "base": base, "without": number(without), "cost": number(c)}
-        history.append({"round": "edge"} | told)
-    return ((carried, hung)[int(np.argmin(along))] if min(along) < MOVED * without else best), x
+    # What goes along may bear a firmer grip than what is held.
+    tried = [replace(one, grip=grip) for one in (carried, hung) for grip in sorted({1.0, best.grip})]
+    without, *along = at_once(cost, [(one, x) for one in (alone, *tried)])
+    for one, c in zip(tried, along, strict=True):
+        told = {"patches": len(rim.radius), "base": one.laying.base, "grip": one.grip}
+        history.append({"round": "edge"} | told | {"without": number(without), "cost": number(c)})
+    return (tried[int(np.argmin(along))] if min(along) < MOVED * without else best), x
 
 
 def settle_pull(
@@ -231,12 +233,13 @@ def _softer(trial: Trial, history: list, why: str) -> Trial:
 
 
 def windows(fitted: np.ndarray, phase: np.ndarray, share: float) -> list[int]:
-    """Last frames of the rounds: each window twice the one before; the first holds the release, if there is one."""
+    """Last frames of the rounds: each window twice the one before, and the first holds all of a pull and its release.
+
+    A shorter one leaves a pull's shape, which is known by then, for one that only its beginning bears out.
+    """
     end = int(fitted[-1])
     released = np.flatnonzero(phase[: end + 1] == PHASES.index("release"))
-    loaded = np.flatnonzero(phase[: end + 1] > 0)
-    needed = released[0] + SETTLED if len(released) else (loaded[0] + SETTLED if len(loaded) else 2)
-    first = max(int(needed), int(share * end), 2)
+    first = max(int(released[0] + SETTLED if len(released) else end), int(share * end))
     ends = [end]
     while ends[0] // 2 >= first:
         ends.insert(0, int(fitted[np.searchsorted(fitted, ends[0] // 2)]))

@@ -17,7 +17,7 @@ from surgisim.diagnosis.nuisance import FINER
 from surgisim.diagnosis.prospect import SHOWS, Gain
 from surgisim.physics.place import Place
 
-SETTINGS = Diagnosing(grid=GRID, nulls=8, experiment=False, free=0)
+SETTINGS = Diagnosing(grid=GRID, replay=GRID, nulls=8, experiment=False, free=0)
 WORSE = Gain(-50.0, -80.0, -20.0, 60.0)
 
 
@@ -89,7 +89,7 @@ def test_nuisances_larger_than_they_ever_are_are_something_hidden(bare, monkeypa
         assert not replace(pushed, settings=SETTINGS.model_copy(update={"calibrated": False})).overstretched
     monkeypatch.setattr(calibration, "OVERSTRETCHED", 0.0)
     # Recorded on the grid that runs are compared with: the coarse one's own error is not tissue's.
-    settings = SETTINGS.model_copy(update={"replay": GRID, "refine": 1, "second": False})
+    settings = SETTINGS.model_copy(update={"refine": 1, "second": False})
     said, physics, _ = verdict(settings, share=FINER * GRID)
     assert (said.verdict, set(physics.terms)) == ("unexplained", {"neo_hookean_ciarlet", "newtonian"})
     assert said.unexplained_fraction > 0.8

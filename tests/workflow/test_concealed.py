@@ -169,7 +169,15 @@ def test_three_real_cases_go_from_their_seal_to_a_score(tmp_path):
         "cases": 3,
         "seed": 4,
         "invent": few | {"snr_low": 3.0, "snr_high": 5.0},
-        "diagnosis": {"workers": 1, "free": 0, "second": False, "nulls": 8, "replay": 0.165, "experiment": False},
+        "diagnosis": {
+            "workers": 1,
+            "free": 0,
+            "second": False,
+            "nulls": 8,
+            "grid": 0.23,
+            "replay": 0.23,
+            "experiment": False,
+        },
     }
     assert tree.run("--set-threads", "diagnosis=1", "--keep-going", "blind") == 0
     out = tmp_path / "out" / "blind" / "4"
