@@ -46,7 +46,8 @@ class Estimation(Settings):
     iterations: int = Field(6, ge=1, le=50)
     """Most Gauss-Newton iterations a round [-]."""
     first_window: float = Field(0.5, gt=0, le=1)
-    """Share of the fitted frames that the first round sees; each further round sees twice as many [-]."""
+    """Share of the fitted frames that the first round sees, unless a pull and its release need more; each further round
+    sees twice as many [-]."""
     field: list[str] = ["corotated.E", "newtonian.eta"]
     """'law.parameter' entries refined per particle, where that pays on frames kept from the refinement [-]."""
     field_iterations: int = Field(6, ge=0, le=200)

@@ -208,6 +208,7 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
     usable = near < 1.5 * spacing
     for center, radius in zip(motion.center_rest, motion.radius, strict=True):
         usable &= np.linalg.norm(rest - center, axis=1) > CLEAR * radius
+    usable &= ~motion.on_rim(rest)
     usable &= recording.visible[:, :until].mean(1) > LEAST_SEEN
     kept = np.flatnonzero(usable)
     if len(kept) < 4:

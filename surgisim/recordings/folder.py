@@ -4,7 +4,8 @@ recording.json  format, name, fps, frames, length_unit (m, cm or mm; of every fi
                 gravity_m_s2 [x, y, z] or null, tier; optional starts: "settled" (default) or "released"
 rest.ply        closed triangle mesh of the body at rest
 fixed.json      {"boxes": [{"min": [x, y, z], "max": [x, y, z]}]}: regions of rest space held still
-grip.npz        center_rest (J, 3), radius (J,), position (J, T, 3), active (J, T): translating grips
+grip.npz        center_rest (J, 3), radius (J,), position (J, T, 3), active (J, T): translating grips; optional rim
+                (E, T, 3) and rim_radius (E,): balls of tissue that go along all the time with what is beyond the body
 tracks.npz      points (K, T, 3), NaN where unseen; visible (K, T); sigma (K,); optional place (K, 3) on the rest body,
                 axes (K, 3): noise along x, y and z over sigma, RMS 1, where it is not alike
 split.json      {"fit": [0, t1], "held_out": [t1, T]}
@@ -119,6 +120,8 @@ def encoded_recording(recording: Recording) -> dict[str, bytes]:
         tracks["axes"] = recording.axes
     grips = {"center_rest": motion.center_rest, "radius": motion.radius}
     grips |= {"position": motion.position, "active": motion.active}
+    if len(motion.rim):
+        grips |= {"rim": motion.rim, "rim_radius": motion.rim_radius}
     files = {
         NAME: _json(told),
         "rest.ply": write_mesh(recording.mesh),
@@ -134,7 +137,8 @@ def encoded_recording(recording: Recording) -> dict[str, bytes]:
 def _motion(path: Path, frames: int, unit: float) -> Motion:
     if not path.is_file():
         return no_grips(frames)
-    grips = arrays(path, {"center_rest": "J3", "radius": "J", "position": "JT3", "active": "JT"}, frames)
+    shapes = {"center_rest": "J3", "radius": "J", "position": "JT3", "active": "JT", "rim": "ET3", "rim_radius": "E"}
+    grips = arrays(path, shapes, frames, optional=("rim", "rim_radius"))
     if not len(grips["radius"]):
         return no_grips(frames)
     active = grips["active"].astype(bool)
@@ -146,8 +150,11 @@ def _motion(path: Path, frames: int, unit: float) -> Motion:
     center = grips["center_rest"].astype(float) * unit
     # Where a grip does not hold, its position does not matter, but the path between must be one.
     position = np.where(np.isfinite(position), position, _carried_on(position, active, center))
+    rim = {name: grips[name].astype(float) * unit for name in ("rim", "rim_radius") if name in grips}
+    if len(rim) == 1:
+        raise Problem(f"{path}: has only '{next(iter(rim))}' of 'rim' and 'rim_radius'. Give both, or neither.")
     sure = np.ones(len(active))
-    return Motion(center, grips["radius"].astype(float) * unit, position, active, sure, source="given")
+    return Motion(center, grips["radius"].astype(float) * unit, position, active, sure, source="given", **rim)
 
 
 def _carried_on(position: np.ndarray, active: np.ndarray, center: np.ndarray) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Run the recorded manipulation, or a new one, on a fitted body."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -55,7 +56,7 @@ def replay(
     task = (
         _recorded(motion, camera)
         if settings.operation is None
-        else plan(settings.operation, body.rest, body.surface, camera, body.spacing)
+        else _held_at_rim(plan(settings.operation, body.rest, body.surface, camera, body.spacing), motion)
     )
     per_frame = checked_per_frame(physics, material, camera.fps) * settings.refine_step
     rim = beyond(scene, camera)
@@ -104,6 +105,12 @@ def replay(
 
 def _recorded(motion: Motion, camera: Camera) -> Plan:
     return Plan(motion, np.zeros((camera.frames, 3)), None, 0)
+
+
+def _held_at_rim(task: Plan, recorded: Motion) -> Plan:
+    """An operation on a body that the recording carries along its edge, which stays with the base now."""
+    rim = recorded.rim[:, :1] + task.base
+    return replace(task, motion=replace(task.motion, rim=rim, rim_radius=recorded.rim_radius))
 
 
 def _path(made: Prepared, task: Plan, physics: Physics, material: Material, camera: Camera, per_frame: int) -> Drive:

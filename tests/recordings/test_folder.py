@@ -239,3 +239,16 @@ def refused(folder, told, name=""):
     sentence = str(caught.value)
     assert name in sentence
     assert "\n" not in sentence
+
+
+def test_what_goes_along_at_the_edge_is_kept(tmp_path):
+    made = recording()
+    frames = made.motion.active.shape[1]
+    rim = np.arange(2.0 * frames * 3).reshape(2, frames, 3)
+    write_recording(replace(made, motion=replace(made.motion, rim=rim, rim_radius=np.array([0.1, 0.2]))), tmp_path)
+    read = read_recording(tmp_path).motion
+    np.testing.assert_array_equal(read.rim, rim)
+    np.testing.assert_array_equal(read.rim_radius, [0.1, 0.2])
+    put(tmp_path / "grip.npz", rim_radius=None)
+    with pytest.raises(Problem, match="has only 'rim' of 'rim' and 'rim_radius'"):
+        read_recording(tmp_path)

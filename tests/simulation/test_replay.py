@@ -85,3 +85,32 @@ def test_files_of_different_bodies_are_refused():
     other = replace(physics, grid={**physics.grid, "spacing": 0.004})
     with pytest.raises(Problem, match=r"was fitted on a grid of 0\.004"):
         replay(body, splats(body), material, other, pulled(), CAMERA, Simulation(), silent)
+
+
+def hung(frames=14):
+    """A slab that nothing but four patches of its face holds, which the recording carries 3 mm aside."""
+    body = replace(slab(), held=np.zeros(len(slab().rest), bool))
+    corners = np.array([[x, y, 0.06] for x in (-0.018, 0.018) for y in (-0.012, 0.012)])
+    aside = np.linspace(0, 1, frames)[:, None] * [0.003, 0.0, 0.0]
+    motion = replace(pulled(frames=frames), rim=corners[:, None] + aside, rim_radius=np.full(4, 0.006))
+    return body, motion
+
+
+def test_a_body_goes_where_its_edge_is_carried():
+    body, motion = hung()
+    aside = replace(motion, position=np.repeat(motion.position[:, :1], 14, 1), active=np.zeros((1, 14), bool))
+    out = replay(body, splats(body), *fitted(body), aside, CAMERA, Simulation(render=False), silent)
+    moved = (out.position[-1] - body.rest)[body.surface]
+    assert np.allclose(np.median(moved, 0), [0.003, 0, 0], atol=3e-4)
+
+
+def test_under_an_operation_such_a_body_stays_with_the_base():
+    body, motion = hung()
+    push = {"act": "pull", "at": [31.5, 23.5], "by": [0.0, 0.0, -0.003], "begin": 0.0, "end": 0.2}
+    settings = Simulation(render=False, operation={"seconds": 0.5, "do": [push]})
+    out = replay(body, splats(body), *fitted(body), motion, CAMERA, settings, silent)
+    moved = out.position[-1] - body.rest
+    middle = np.linalg.norm(body.rest - [0, 0, 0.06], axis=1).argmin()
+    corner = np.linalg.norm(body.rest - [0.018, 0.012, 0.06], axis=1).argmin()
+    assert moved[middle, 2] == pytest.approx(-0.003, abs=8e-4)
+    assert np.linalg.norm(moved[corner]) < 5e-4
