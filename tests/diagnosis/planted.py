@@ -1,7 +1,6 @@
 """A small block of tissue whose recording the engine itself makes, with a law planted or none."""
 
 import hashlib
-import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -73,12 +72,13 @@ def recording(values=None, places=None, seed=0, sigma=1.5e-4, fps=FPS, late=0.0,
 BLOB = Place((0.008, 0.006, 0.010), 0.0035)
 TILT = {"gravity": {"x": 8.0, "y": 0.0, "z": 0.0, "onset": -1.0}}
 """Weight along x, from the first frame on [m/s^2]."""
-_RUNS = tempfile.TemporaryDirectory(prefix="planted-")
+RUNS: Path | None = None
+"""Where runs are kept; conftest.py sets it."""
 
 
 def memo_of(made: Recording) -> Memo:
     """Runs of a recording are made once, whichever test wants them."""
-    return Memo(Path(_RUNS.name), hashlib.sha256(made.points.tobytes()).hexdigest())
+    return Memo(RUNS, hashlib.sha256(made.points.tobytes()).hexdigest())
 
 
 def case_of(made: Recording, **settings) -> Case:
