@@ -8,7 +8,6 @@ import numpy as np
 from surgisim.estimation.gauss_newton import Solution, derivative
 from surgisim.estimation.otherwise import Otherwise, on_no_grid, settled
 from surgisim.estimation.rounds import number, plain
-from surgisim.estimation.search import Search
 from surgisim.estimation.trial import Trial
 from surgisim.mpm.simulator import Breakdown
 
@@ -23,9 +22,7 @@ Say = Callable[[float, float, str], None]
 def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[Trial, Solution]:
     """The fit on a finer grid; the same one, with a line in `history`, where that cannot be simulated.
 
-    The first steps go by the wider grid's derivative. Then what a grid changes most gets one of its own: the laws'
-    numbers and moments of release, which pace a swing, and how far a grip comes nearer. Of all else the wider grid's
-    serves on: both grids' fits swing as the recording does.
+    The first steps go by the wider grid's derivative, the others by one of its own.
     """
     fine = replace(trial, laying=trial.laying.finer(FINER))
     wanted = trial.wanted
@@ -38,9 +35,8 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
         history.append({"round": "finer grid", "cost": None, "broke": BROKE})
         return trial, solution
     say(0.4, 1.0, f"on a finer grid: {plain(wanted, found.x)}")
-    own, J = changed(wanted), solution.jacobian.copy()
     try:
-        J[:, own] = derivative(fine.together, found.x, found.residual, wanted.differences, wanted.bounds, own)
+        J = derivative(fine.together, found.x, found.residual, wanted.differences, wanted.bounds)
     except Breakdown as breakdown:
         history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
         return trial, solution
@@ -48,9 +44,3 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
     found = settled(Otherwise("finer grid", fine, begin=found.x), here, enough=NEARLY)
     history.append({"round": "finer grid", "cost": number(found.cost)} | plain(wanted, found.x))
     return fine, replace(here, x=found.x, residual=found.residual)
-
-
-def changed(wanted: Search) -> np.ndarray:
-    """The numbers whose derivative a grid changes most, (N,) int."""
-    laws, ends = len(wanted.free), (".release", ".toward")
-    return np.array([k for k, name in enumerate(wanted.names) if k < laws or name.endswith(ends)], int)

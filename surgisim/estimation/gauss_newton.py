@@ -111,20 +111,17 @@ def derivative(
     r: np.ndarray,
     differences: np.ndarray,
     bounds: tuple[np.ndarray, np.ndarray],
-    by: np.ndarray | None = None,
 ) -> np.ndarray:
     """Derivative of the residuals r, (R,), at x, (M,), by differences of these sizes, (R, M).
 
-    together(xs): the residuals of several x. by: the numbers by which it is taken, (N,) int, for (R, N); all if None.
-    Raises Breakdown where neither side of a number can be simulated.
+    together(xs): the residuals of several x. Raises Breakdown where neither side of a number can be simulated.
     """
     low, high = bounds
-    way = np.eye(len(x)) if by is None else np.eye(len(x))[by]
-    side = way @ (np.where(x + differences <= high, 1.0, -1.0) * differences)
-    shifted = together(list(x + side[:, None] * way))
+    side = np.where(x + differences <= high, 1.0, -1.0) * differences
+    shifted = together(list(x + np.diag(side)))
     for m in [m for m, s in enumerate(shifted) if s is None]:
         side[m] = -side[m]
-        (shifted[m],) = together([np.clip(x + side[m] * way[m], low, high)])
+        (shifted[m],) = together([np.clip(x + side[m] * np.eye(len(x))[m], low, high)])
     if any(s is None for s in shifted):
         raise Breakdown(
             "estimation: the simulation breaks down a small step beside the current parameters. "
