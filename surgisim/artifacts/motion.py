@@ -46,7 +46,7 @@ class Motion(Artifact):
         if self.late is None:
             object.__setattr__(self, "late", np.zeros(j))
         t = self.active.shape[-1]
-        if self.rim is None:
+        if self.rim is None or not len(self.rim):
             object.__setattr__(self, "rim", np.zeros((0, t, 3)))
             object.__setattr__(self, "rim_radius", np.zeros(0))
         shapes = [self.center_rest.shape, self.radius.shape, self.position.shape, self.active.shape, self.late.shape]
