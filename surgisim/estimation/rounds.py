@@ -127,6 +127,10 @@ def choose_support(
     # What says where patches go is no evidence that they do.
     observation = rim.leaves(best.observation, best.motion)
     alone = replace(best, observation=observation, laying=replace(best.laying, observation=observation, kept={}))
+    if best.error:
+        # A point that is left out says nothing of the simulation's own error either.
+        size = np.where(observation.weight > 0, best.error.size, 0.0)
+        alone = replace(alone, error=replace(best.error, size=size, kept={}))
     carried = replace(alone, motion=rim.carries(alone.motion))
     hung = replace(carried, laying=replace(carried.laying, base=False, kept={}))
     # What goes along may bear a firmer grip than what is held.

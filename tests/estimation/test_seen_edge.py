@@ -12,7 +12,7 @@ from surgisim.config.estimation import Estimation
 from surgisim.estimation.fit import estimate
 from surgisim.estimation.rim import PATCHES, seen_rim
 
-AWAY = np.array([0.004, 0.002, 0.0])
+AWAY = np.array([0.012, 0.006, 0.0])
 """How far everything beyond the picture goes in the end [m]."""
 
 
@@ -66,11 +66,12 @@ def quick():
 
 
 def fitted(moved: np.ndarray | None, settings: Estimation):
-    """The fit of a pulled slab to whose points something else is added that moves them so, (T, 3) [m]."""
+    """The fit of a pulled slab that something else moves so, grip and all, (T, 3) [m]."""
     case = list(clip(TRUE))
     if moved is not None:
         rest = case[2].xyz[:, 0].astype(float)
         case[2] = tracks_of(case[2].xyz - rest[:, None] + moved, rest)
+        case[3] = replace(case[3], position=case[3].position + moved)
     return estimate(*case, settings, silent)
 
 
