@@ -234,7 +234,7 @@ def _opened(
     if laid is None:
         return replace(trial, wanted=wanted)
     depth = open_depth(laid)
-    laying = Laying(laid, EDGES[0].beyond * depth.size, EDGES[0].rim, trial.observation, make)
+    laying = Laying(laid, EDGES[0].margin(depth, laid.spacing), EDGES[0].rim, trial.observation, make)
     return replace(trial, wanted=replace(wanted, depth=depth), laying=laying)
 
 

@@ -24,8 +24,8 @@ KEPT = 3
 """Bodies kept for each worker: one that several numbers are varied on, and the last ones beside it."""
 NEIGHBOURS = 60
 """Columns whose plane the surface follows beyond what is seen."""
-BELOW = 1.0
-"""Held tissue below the cut, in grid cells: as far as the splines of what moves reach down."""
+HELD = 1.0
+"""Held tissue beyond what is free, in grid cells, below as at the rim: as far as the splines of what moves reach."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Columns:
         """The body whose tissue ends `depth` [m] below the surface, held there or not, and at its rim or not."""
         end = (self._plane if self.flat else self.above) + depth
         free = np.maximum(np.rint((end - self.begin) / self.layer), 0).astype(int)
-        held = max(1, round(BELOW * self.spacing / self.layer)) if base else 0
+        held = max(1, round(HELD * self.spacing / self.layer)) if base else 0
         kept = free > 0
         high = np.where(kept, (end - self.begin) / np.maximum(free, 1), self.layer)
         count = np.where(kept, free + held, 0)
@@ -82,55 +82,63 @@ class Columns:
         )
 
     @property
+    def pitch(self) -> np.ndarray:
+        """How far apart columns stand along x and along y [m], (2,): not quite as far, where a body fills its box."""
+        apart = [np.diff(np.unique(self.xy[:, a])) for a in (0, 1)]
+        return np.array([np.median(d[d > 0.1 * self.spacing]) for d in apart])
+
+    @property
     def _plane(self) -> np.ndarray:
         """Depth of the plane that lies nearest the surface, at every column [m], (N,)."""
         across = np.column_stack([self.xy, np.ones(len(self.xy))])
         return across @ np.linalg.lstsq(across, self.above, rcond=None)[0]
 
 
-def beyond(columns: Columns, margin: float) -> Columns:
-    """The same with tissue around it as far as `margin` [m], its surface going on as the nearest part of it lies.
+def beyond(columns: Columns, margin: float, held: float = 0.0) -> Columns:
+    """The same with tissue around it as far as `margin` [m], and for another `held` [m] tissue that is its rim.
 
     Tissue does not end where the picture does. Beyond it the surface is the plane of the nearest columns.
     """
-    width = np.sqrt(np.median(columns.area))
+    pitch = columns.pitch
     low, high = columns.xy.min(0), columns.xy.max(0)
-    more = int(np.ceil(margin / width))
-    x, y = (np.arange(-more, round((high[a] - low[a]) / width) + more + 1) * width + low[a] for a in range(2))
+    more = np.rint((margin + held) / pitch).astype(int)
+    x, y = (np.arange(-more[a], round((high[a] - low[a]) / pitch[a]) + more[a] + 1) * pitch[a] + low[a] for a in (0, 1))
     around = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
-    known = cKDTree(columns.xy)
-    away = known.query(around)[0]
-    around = around[(away > 0.7 * width) & (away <= margin + 0.1 * width)]
-    near = known.query(around, k=min(NEIGHBOURS, len(columns.xy)))[1]
+    away = cKDTree(columns.xy).query(around)[0]
+    new = cKDTree(columns.xy / pitch).query(around / pitch)[0] > 0.7
+    slack = 0.1 * pitch.min()
+    chosen = new & (away <= margin + held + slack)
+    around, away = around[chosen], away[chosen]
+    near = cKDTree(columns.xy).query(around, k=min(NEIGHBOURS, len(columns.xy)))[1]
     place, z = columns.xy[near], columns.above[near]
     centre = place.mean(1, keepdims=True)
     slope = np.linalg.pinv(place - centre) @ (z - z.mean(1, keepdims=True))[..., None]
     above = z.mean(1) + ((around[:, None] - centre) @ slope)[:, 0, 0]
     count = len(around)
-    edge = cKDTree(around).query(around, k=5)[0][:, 4] > 1.2 * width
     return replace(
         columns,
         xy=np.concatenate([columns.xy, around]),
         begin=np.concatenate([columns.above, above]),
         above=np.concatenate([columns.above, above]),
-        area=np.concatenate([columns.area, np.full(count, width**2)]),
+        area=np.concatenate([columns.area, np.full(count, pitch.prod())]),
         color=np.concatenate([columns.color, columns.color[near[:, 0]]]),
         seen=np.concatenate([columns.seen, np.zeros(count, bool)]),
-        rim=np.concatenate([np.zeros(len(columns.rim), bool), edge]),
+        rim=np.concatenate([np.zeros(len(columns.rim), bool), away > margin + slack]),
     )
 
 
 def finer(columns: Columns, times: float) -> Columns:
     """The same tissue in columns and layers that many times as fine, for a grid as much finer."""
-    width = np.sqrt(np.median(columns.area))
+    pitch = columns.pitch
     low, high = columns.xy.min(0), columns.xy.max(0)
-    counts = np.rint((np.rint((high - low) / width) + 1) * times).astype(int)
-    x, y = (low[a] - 0.5 * width + (high[a] - low[a] + width) * (np.arange(n) + 0.5) / n for a, n in enumerate(counts))
+    counts = np.rint((np.rint((high - low) / pitch) + 1) * times).astype(int)
+    x, y = (
+        low[a] - 0.5 * pitch[a] + (high[a] - low[a] + pitch[a]) * (np.arange(n) + 0.5) / n for a, n in enumerate(counts)
+    )
     place = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
-    known = cKDTree(columns.xy)
-    # Every new column stands within the width of one of the old.
-    away, owner = known.query(place, p=np.inf)
-    place, owner = place[away < 0.501 * width], owner[away < 0.501 * width]
+    # Every new column stands within one of the old.
+    away, owner = cKDTree(columns.xy / pitch).query(place / pitch, p=np.inf)
+    place, owner = place[away < 0.501], owner[away < 0.501]
     both = np.stack([columns.begin, columns.above], -1)
     smooth = LinearNDInterpolator(columns.xy, both)(place)
     begin, above = np.where(np.isfinite(smooth), smooth, both[owner]).T
@@ -176,7 +184,8 @@ class Laying:
     @cached_property
     def whole(self) -> Columns:
         """With what lies beyond the picture."""
-        return beyond(self.columns, self.margin) if self.margin > 0 else self.columns
+        held = HELD * self.columns.spacing if self.rim else 0.0
+        return beyond(self.columns, self.margin, held) if self.margin + held > 0 else self.columns
 
     def at(self, depth: float, motion: Motion, worker: int) -> tuple[Prepared, Observation]:
         """A body held from `depth` [m] on, and what it is compared with; `worker`: whose arrays it uses."""

@@ -95,7 +95,7 @@ def rivals(trial: Trial, x: np.ndarray) -> Iterator[Otherwise]:
     yield Otherwise(AS_IT_IS, trial, rival=True)
     laying = trial.laying
     for edge in EDGES:
-        margin = edge.beyond * trial.wanted.depth.size
+        margin = edge.margin(trial.wanted.depth, laying.columns.spacing)
         if (margin, edge.rim) != (laying.margin, laying.rim):
             yield Otherwise(
                 f"{margin * 1e3:.0f} mm beyond the picture, {'held' if edge.rim else 'free'}",
@@ -116,7 +116,8 @@ def otherwise(trial: Trial, x: np.ndarray, camera: Camera, points: np.ndarray, m
     yield Otherwise(AS_IT_IS, trial)
     yield from _views(trial, x, camera, points, make)
     laying = trial.laying
-    farther = laying.ending(laying.margin + EDGE * trial.wanted.depth.size, laying.rim)
+    pitch = laying.columns.pitch.max()
+    farther = laying.ending(laying.margin + max(1, round(EDGE * trial.wanted.depth.size / pitch)) * pitch, laying.rim)
     yield Otherwise("edge", replace(trial, laying=farther))
     yield from _laws(trial, make)
 

@@ -108,7 +108,8 @@ def choose_support(
         if nearer:
             x[nearer] = share * wanted.spread[nearer]
         points.append(np.clip(x, *wanted.bounds))
-    edges = [replace(trial, laying=trial.laying.ending(e.beyond * wanted.depth.size, e.rim)) for e in EDGES]
+    margins = [e.margin(wanted.depth, trial.laying.columns.spacing) for e in EDGES]
+    edges = [replace(trial, laying=trial.laying.ending(m, e.rim)) for m, e in zip(margins, EDGES, strict=True)]
     say(0.03, 1.0, f"comparing {len(points) + len(edges) - 1} ways the body may be held")
 
     def cost(job, worker):
@@ -119,8 +120,8 @@ def choose_support(
     costs = at_once(cost, [(edges[0], x) for x in points])
     x = points[int(np.argmin(costs))]
     others = [min(costs), *at_once(cost, [(edge, x) for edge in edges[1:]])]
-    for edge, c in zip(EDGES, others, strict=True):
-        history.append({"round": "edge", "beyond": edge.beyond * wanted.depth.size, "rim": edge.rim, "cost": number(c)})
+    for margin, edge, c in zip(margins, EDGES, others, strict=True):
+        history.append({"round": "edge", "beyond": margin, "rim": edge.rim, "cost": number(c)})
     best = edges[int(np.argmin(others))]
     if rim is None:
         return best, x

@@ -29,6 +29,11 @@ class Edge:
     rim: bool
     """Whether it is held where it ends."""
 
+    def margin(self, depth: Unknown, spacing: float) -> float:
+        """How far beyond what is seen [m]: whole cells of the grid, so that a finer one has the same end."""
+        cells = self.beyond * depth.size / spacing
+        return max(1, round(cells)) * spacing if self.beyond else 0.0
+
 
 EDGES = (Edge(0.35, False), Edge(0.35, True), Edge(0.8, False), Edge(0.0, False), Edge(0.0, True))
 """What is tried, the most expected first: tissue does not end where a picture does."""

@@ -8,7 +8,7 @@ from scipy import sparse
 from slab import slab
 from slab_clip import CAMERA
 
-from surgisim.estimation.lay import beyond, upright
+from surgisim.estimation.lay import beyond, finer, upright
 from surgisim.estimation.observation import Filmed
 
 
@@ -68,5 +68,22 @@ def test_tissue_beyond_the_picture_lies_on_the_plane_of_its_edge():
     assert np.allclose(wider.above[new], 0.06 + 0.2 * wider.xy[new, 0], atol=2e-4)
     assert wider.area.sum() == pytest.approx((0.048 + 0.018) * (0.036 + 0.018), rel=0.1)
     assert not wider.seen[new].any()
-    assert wider.rim[new].any()
-    assert not wider.rim[: len(columns.xy)].any()
+    assert not wider.rim.any()
+    held = beyond(columns, 0.009, 0.006)
+    out = abs(held.xy) > [0.024 + 0.009, 0.018 + 0.009]
+    assert np.array_equal(held.rim, out.any(1) | held.rim & ~out.any(1) & (abs(held.xy) > [0.024, 0.018]).all(1))
+    assert held.xy[held.rim].max(0) == pytest.approx(columns.xy.max(0) + 0.015, abs=1e-4)
+
+
+def test_columns_that_stand_closer_one_way_than_the_other_are_made_finer_without_gaps():
+    body = slab()
+    squeezed = body.rest * np.array([1.03, 0.98, 1.0], np.float32)
+    columns = upright(replace(body, rest=squeezed), CAMERA)
+    fine = finer(columns, 1.5)
+    nx, ny = np.rint(1.5 * (np.ptp(columns.xy, 0) / columns.pitch + 1))
+    assert len(fine.xy) == nx * ny
+    assert fine.area.sum() == pytest.approx(columns.area.sum())
+    # What is laid around it lies around it.
+    wider = beyond(fine, columns.spacing, fine.spacing)
+    new = wider.xy[len(fine.xy) :]
+    assert (abs(new) > abs(fine.xy).max(0)).any(1).all()
