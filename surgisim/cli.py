@@ -94,7 +94,7 @@ def demo(
     dry_run: DryRun = False,
     debug: Debug = False,
 ) -> None:
-    """Run the whole graph on the embedded clip, whose truth is known, with viscosity and without."""
+    """Run the whole graph on the embedded clip, whose truth is known, fitted and at default numbers."""
     from surgisim.config.phantom import Phantom
 
     camera = Phantom()
@@ -105,7 +105,7 @@ def demo(
         name="demo",
         out=out,
         operation=operation,
-        variant=variant or ["main", "elastic"],
+        variant=variant or ["main", "elastic_default"],
         variants=variants,
         config=config,
         set_=[*told, *(set_ or [])],

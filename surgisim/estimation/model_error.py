@@ -6,7 +6,8 @@ tissue does, once that is let go: how far it swings for a pull is a guess, how f
 its thousands of differences for independent would bend the tissue's numbers after it. Here each field is a Gaussian
 process and is integrated out (Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63, 2001), so that
 the shape of the motion tells as much as a few dozen numbers do, and the course in time, which a field does not bend,
-all it can.
+all it can. How far all of a pull goes is no part of its field: that is the length of the grip's path, which has a prior
+of its own, and would be known twice as little.
 """
 
 from dataclasses import dataclass, field
@@ -31,7 +32,7 @@ class ModelError:
     """The error's modes at the tracked points."""
 
     modes: np.ndarray
-    """Times their standard deviations, as shares of `size`, (K, Q)."""
+    """Times their standard deviations, as shares of `size`, of a pull and of what is let go, (2, K, Q)."""
     size: np.ndarray
     """Displacement, with the sign of its course, over the standard deviation of what is seen, (K, T, 3)."""
     free: np.ndarray
@@ -53,19 +54,19 @@ class ModelError:
 
     def _whitened(self, r: np.ndarray, frames: np.ndarray, field: int) -> np.ndarray:
         size, inner = self._of(frames, field)
-        out = r.copy()
+        modes, out = self.modes[field], r.copy()
         for c in range(r.shape[-1]):
-            told = self.modes.T @ (size[..., c] * r[..., c]).sum(1)
-            out[..., c] -= size[..., c] * (self.modes @ (inner[c] @ told))[:, None]
+            told = modes.T @ (size[..., c] * r[..., c]).sum(1)
+            out[..., c] -= size[..., c] * (modes @ (inner[c] @ told))[:, None]
         return out
 
     def _of(self, frames: np.ndarray, field: int) -> tuple[np.ndarray, list[np.ndarray]]:
         key = field, frames.tobytes()
         if key not in self.kept:
             size = np.sqrt(self.independent) * self.size[:, frames]
-            inner = []
+            modes, inner = self.modes[field], []
             for c in range(size.shape[-1]):
-                gram = (self.modes * (size[..., c] ** 2).sum(1)[:, None]).T @ self.modes
+                gram = (modes * (size[..., c] ** 2).sum(1)[:, None]).T @ modes
                 inner.append(inverse_root(gram))
             self.kept[key] = size, inner
         return self.kept[key]
@@ -88,4 +89,7 @@ def model_error(seen: Observation, course: np.ndarray, free: np.ndarray, indepen
     value, vector = np.linalg.eigh(np.exp(-0.5 * (apart / reach) ** 2))
     chosen = value > LEAST * value[-1]
     modes = SHARE * vector[:, chosen] * np.sqrt(value[chosen])
-    return ModelError(modes, seen.weight * far[:, None, None] * course[None, :, None], free, independent)
+    pulled = modes - np.average(modes, axis=0, weights=far**2)
+    return ModelError(
+        np.stack([pulled, modes]), seen.weight * far[:, None, None] * course[None, :, None], free, independent
+    )
