@@ -229,7 +229,9 @@ def _opened(
         measured = bool((trial.observation.weight[..., 2] > 0).any())
         wanted = replace(wanted, carrying=carrying(motion, tracks, camera, measured))
     free = phases(motion, trial.frames) == PHASES.index("release")
-    trial = replace(trial, error=model_error(trial.observation, course(tracks, motion), free, INDEPENDENT))
+    trial = replace(
+        trial, error=model_error(trial.observation, course(tracks, motion), free, INDEPENDENT, settings.carrying)
+    )
     laid = upright(body, camera) if settings.support and settings.form == "total" else None
     if laid is None:
         return replace(trial, wanted=wanted)

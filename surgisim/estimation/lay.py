@@ -83,7 +83,7 @@ class Columns:
 
     @property
     def pitch(self) -> np.ndarray:
-        """How far apart columns stand along x and along y [m], (2,): not quite as far, where a body fills its box."""
+        """How far apart columns stand along x and along y [m], (2,): a little unlike, as both ways they fill a box."""
         apart = [np.diff(np.unique(self.xy[:, a])) for a in (0, 1)]
         return np.array([np.median(d[d > 0.1 * self.spacing]) for d in apart])
 
@@ -104,12 +104,13 @@ def beyond(columns: Columns, margin: float, held: float = 0.0) -> Columns:
     more = np.rint((margin + held) / pitch).astype(int)
     x, y = (np.arange(-more[a], round((high[a] - low[a]) / pitch[a]) + more[a] + 1) * pitch[a] + low[a] for a in (0, 1))
     around = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
-    away = cKDTree(columns.xy).query(around)[0]
+    known = cKDTree(columns.xy)
+    away = known.query(around)[0]
     new = cKDTree(columns.xy / pitch).query(around / pitch)[0] > 0.7
     slack = 0.1 * pitch.min()
     chosen = new & (away <= margin + held + slack)
     around, away = around[chosen], away[chosen]
-    near = cKDTree(columns.xy).query(around, k=min(NEIGHBOURS, len(columns.xy)))[1]
+    near = known.query(around, k=min(NEIGHBOURS, len(columns.xy)))[1]
     place, z = columns.xy[near], columns.above[near]
     centre = place.mean(1, keepdims=True)
     slope = np.linalg.pinv(place - centre) @ (z - z.mean(1, keepdims=True))[..., None]

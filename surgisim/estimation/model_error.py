@@ -6,8 +6,8 @@ tissue does, once that is let go: how far it swings for a pull is a guess, how f
 its thousands of differences for independent would bend the tissue's numbers after it. Here each field is a Gaussian
 process and is integrated out (Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63, 2001), so that
 the shape of the motion tells as much as a few dozen numbers do, and the course in time, which a field does not bend,
-all it can. How far all of a pull goes is no part of its field: that is the length of the grip's path, which has a prior
-of its own, and would be known twice as little.
+all it can. Where the length of the grip's path is fitted, with a prior of its own, how far all of a pull goes is no part
+of its field: it would be left open twice.
 """
 
 from dataclasses import dataclass, field
@@ -72,10 +72,13 @@ class ModelError:
         return self.kept[key]
 
 
-def model_error(seen: Observation, course: np.ndarray, free: np.ndarray, independent: float) -> ModelError:
+def model_error(
+    seen: Observation, course: np.ndarray, free: np.ndarray, independent: float, path_fitted: bool = True
+) -> ModelError:
     """The error of a simulation that is compared with these points.
 
-    course: share of the pull in every frame, (T,); free: whether no grip holds any more, (T,) bool.
+    course: share of the pull in every frame, (T,); free: whether no grip holds any more, (T,) bool. path_fitted:
+    whether the length of the grip's path is fitted beside it.
     """
     used = seen.weight > 0
     moved = np.linalg.norm(seen.displacement * used, axis=-1)
@@ -89,7 +92,7 @@ def model_error(seen: Observation, course: np.ndarray, free: np.ndarray, indepen
     value, vector = np.linalg.eigh(np.exp(-0.5 * (apart / reach) ** 2))
     chosen = value > LEAST * value[-1]
     modes = SHARE * vector[:, chosen] * np.sqrt(value[chosen])
-    pulled = modes - np.average(modes, axis=0, weights=far**2)
+    pulled = modes - np.average(modes, axis=0, weights=far**2) if path_fitted else modes
     return ModelError(
         np.stack([pulled, modes]), seen.weight * far[:, None, None] * course[None, :, None], free, independent
     )

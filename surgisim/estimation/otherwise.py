@@ -116,6 +116,7 @@ def otherwise(trial: Trial, x: np.ndarray, camera: Camera, points: np.ndarray, m
     yield Otherwise(AS_IT_IS, trial)
     yield from _views(trial, x, camera, points, make)
     laying = trial.laying
+    # Only whole columns can be added, so the change is the nearest to one standard deviation that there is.
     pitch = laying.columns.pitch.max()
     farther = laying.ending(laying.margin + max(1, round(EDGE * trial.wanted.depth.size / pitch)) * pitch, laying.rim)
     yield Otherwise("edge", replace(trial, laying=farther))
