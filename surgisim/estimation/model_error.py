@@ -6,8 +6,8 @@ tissue does, once that is let go: how far it swings for a pull is a guess, how f
 its thousands of differences for independent would bend the tissue's numbers after it. Here each field is a Gaussian
 process and is integrated out (Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63, 2001), so that
 the shape of the motion tells as much as a few dozen numbers do, and the course in time, which a field does not bend,
-all it can. Where the length of the grip's path is fitted, with a prior of its own, how far all of a pull goes is no part
-of its field: it would be left open twice.
+all it can. Where the length of the grip's path is fitted, with a prior of its own, how far all of a pull goes is no
+part of its field: it would be left open twice.
 """
 
 from dataclasses import dataclass, field
