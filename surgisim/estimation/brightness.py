@@ -11,7 +11,7 @@ angle), how the surface leant at rest, which its depth tells only roughly, and t
 is linear to first order and is integrated out, as the error of the simulation is for the tracks (model_error.py).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -65,6 +65,8 @@ class Brightness:
     """Share of the numbers that counts as independent."""
     carry: sparse.csr_matrix
     """Active nodes to the points and to four places around each, (5 K, A)."""
+    kept: dict = field(default_factory=dict, init=False, compare=False, repr=False)
+    """What is computed once for the frames that are looked at."""
 
     def carried_by(self, simulator: Simulator) -> Self:
         """The same points on another grid."""
@@ -82,9 +84,18 @@ class Brightness:
         turning, nearer, across, down = self._changes(u, frames)
         weight = self.weight[:, frames]
         r = weight * (MATTE * turning + nearer - self.seen[:, frames])
-        size = np.sqrt(self.independent) * weight
-        columns = np.stack([MATTE_SPREAD * turning, LEANING * across, LEANING * down], -1) * size[..., None]
-        return _whitened(r, columns, self.modes, size * np.abs(self.course[frames]))
+        columns = np.stack([MATTE_SPREAD * turning, LEANING * across, LEANING * down], -1)
+        columns *= np.sqrt(self.independent) * weight[..., None]
+        return _whitened(r, columns, self.modes, *self._modes_of(frames))
+
+    def _modes_of(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The modes' size at `frames`, (K, F), and their inner inverse root, (Q, Q), computed once."""
+        key = frames.tobytes()
+        if key not in self.kept:
+            size = np.sqrt(self.independent) * self.weight[:, frames] * np.abs(self.course[frames])
+            gram = (self.modes * (size**2).sum(1)[:, None]).T @ self.modes
+            self.kept[key] = size, inverse_root(gram)
+        return self.kept[key]
 
     def _changes(self, u: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, ...]:
         """By turning and by coming nearer, and what turning changes by for a unit of slope at rest, (K, F) each."""
@@ -109,22 +120,18 @@ class Brightness:
         return turning, nearer, *leant
 
 
-def _whitened(r: np.ndarray, columns: np.ndarray, modes: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """(1 + B B^T)^(-1/2) r for r (K, F): squares of what the columns of B leave to tell.
+def _whitened(r: np.ndarray, columns: np.ndarray, modes: np.ndarray, size: np.ndarray, inner: np.ndarray) -> np.ndarray:
+    """Of r, (K, F), what is left to tell: its squares are r^T (1 + B B^T + C C^T)^(-1) r.
 
-    B is `columns` (K, F, C) beside every mode (K, Q) times `size` (K, F).
+    B is every mode (K, Q) times `size` (K, F), C `columns` (K, F, C); inner: `inverse_root` of B^T B, (Q, Q). The modes
+    go first, as they are the same for every simulation: what hangs on one is a matrix of C x C.
     """
-    beside = np.einsum("kfc,kf,kq->cq", columns, size, modes, optimize=True)
-    gram = np.block(
-        [
-            [np.einsum("kfc,kfd->cd", columns, columns), beside],
-            [beside.T, (modes * (size**2).sum(1)[:, None]).T @ modes],
-        ]
-    )
-    told = np.concatenate([np.einsum("kfc,kf->c", columns, r), modes.T @ (size * r).sum(1)])
-    taken = inverse_root(gram) @ told
-    count = columns.shape[-1]
-    return r - columns @ taken[:count] - size * (modes @ taken[count:])[:, None]
+    both = np.concatenate([r[..., None], columns], -1)
+    told = modes.T @ np.einsum("kf,kfc->kc", size, both)
+    both = both - size[..., None] * (modes @ (inner @ told))[:, None]
+    r, columns = both[..., 0], both[..., 1:]
+    taken = inverse_root(np.einsum("kfc,kfd->cd", columns, columns)) @ np.einsum("kfc,kf->c", columns, r)
+    return r - columns @ taken
 
 
 def tangents_of(rest: np.ndarray) -> np.ndarray:

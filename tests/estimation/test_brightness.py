@@ -8,6 +8,7 @@ from slab import pulled, slab
 
 from surgisim.estimation.brightness import MATTE, Brightness, _whitened, carry_of, headlight, tangents_of
 from surgisim.estimation.light_along_tracks import brightness
+from surgisim.estimation.whiten import inverse_root
 from surgisim.mpm.setup import prepare
 
 LAWS = {"corotated": {"E": 900.0, "nu": 0.4}, "newtonian": {"eta": 1.0}}
@@ -51,18 +52,15 @@ def test_a_surface_that_turns_away_darkens_with_the_cosine():
     assert nearer == pytest.approx(0.0)
 
 
-def test_whitening_is_the_inverse_root_of_the_covariance():
+def test_what_is_left_has_the_squares_that_the_inverse_covariance_gives():
     rng = np.random.default_rng(0)
-    r, columns, modes, size = (
-        rng.normal(size=(6, 4)),
-        rng.normal(size=(6, 4, 2)),
-        rng.normal(size=(6, 3)),
-        rng.random((6, 4)),
-    )
-    B = np.concatenate([columns, modes[:, None] * size[..., None]], -1).reshape(24, 5)
-    value, vector = np.linalg.eigh(np.eye(24) + B @ B.T)
-    wanted = (vector / np.sqrt(value)) @ vector.T @ r.ravel()
-    assert _whitened(r, columns, modes, size).ravel() == pytest.approx(wanted, abs=1e-9)
+    columns, modes, size = rng.normal(size=(6, 4, 2)), rng.normal(size=(6, 3)), rng.random((6, 4))
+    of_modes = (modes[:, None] * size[..., None]).reshape(24, 3)
+    B = np.concatenate([columns.reshape(24, 2), of_modes], -1)
+    inner = inverse_root(of_modes.T @ of_modes)
+    for r in rng.normal(size=(5, 6, 4)):
+        left = _whitened(r, columns, modes, size, inner)
+        assert (left**2).sum() == pytest.approx(r.ravel() @ np.linalg.solve(np.eye(24) + B @ B.T, r.ravel()))
 
 
 def test_the_right_pull_explains_the_light_and_one_along_the_surface_does_not():
