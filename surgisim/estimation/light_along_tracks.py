@@ -5,8 +5,9 @@ import numpy as np
 
 from surgisim.artifacts.masks import Masks
 from surgisim.estimation.brightness import Brightness, carry_of, tangents_of
+from surgisim.lighting.veil import veil_of
 from surgisim.mpm.simulator import Simulator
-from surgisim.perception.depth.near_light import linear_light
+from surgisim.perception.depth.near_light import ABOVE, linear_light
 from surgisim.perception.tracking.between import sample
 from surgisim.perception.tracking.flow_chain import widen
 
@@ -44,7 +45,7 @@ def brightness(
     a frame in which none is visible is left aside.
     course: share of the pull in every frame, (T,). step: over how far a surface's turning is taken [m].
     """
-    light, clear = _read(rgb, spoilt, xy)
+    light, clear = _read(rgb, spoilt, xy, veil_of(rgb, spoilt))
     known = visible & clear & visible[:, :1] & clear[:, :1]
     change = np.where(known, light - light[:, :1], 0.0)
     far = np.linalg.norm(np.where(visible[..., None], xy - xy[:, :1], 0.0), axis=-1)
@@ -72,17 +73,17 @@ def spoilt(masks: Masks) -> np.ndarray:
     return np.stack([widen(t, by) | widen(s, 1) for t, s in zip(masks.tool, masks.specular, strict=True)])
 
 
-def _read(rgb: np.ndarray, spoilt: np.ndarray, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Log of the linear light around points and whether nothing spoils it, (K, T) each."""
+def _read(rgb: np.ndarray, spoilt: np.ndarray, xy: np.ndarray, grey: float) -> tuple[np.ndarray, np.ndarray]:
+    """Log of the linear light around points without a veil's, and whether nothing spoils it, (K, T) each."""
     width = max(BLUR * max(rgb.shape[1:3]), 0.7)
     light, clear = np.empty(xy.shape[:2]), np.empty(xy.shape[:2], bool)
     for t, frame in enumerate(rgb):
         usable = (~spoilt[t] & (frame.max(-1) < 250) & (frame.max(-1) > 8)).astype(np.float32)
         share = cv2.GaussianBlur(usable, (0, 0), width)
-        mean = cv2.GaussianBlur(linear_light(frame).mean(-1) * usable, (0, 0), width) / np.maximum(share, 1e-3)
+        mean = cv2.GaussianBlur(linear_light(frame).mean(-1) * usable, (0, 0), width) / np.maximum(share, 1e-3) - grey
         at = xy[:, t, None].astype(np.float32)
         light[:, t] = np.log(np.maximum(sample(mean, at)[:, 0], 1e-4))
-        clear[:, t] = sample(share, at)[:, 0] > 0.8
+        clear[:, t] = (sample(share, at)[:, 0] > 0.8) & (sample(mean, at)[:, 0] >= ABOVE * grey)
     return light, clear
 
 

@@ -56,13 +56,15 @@ def test_a_tilted_sheet_of_any_paint_is_found_tilted():
     assert 0.4 < slope < 1.3
 
 
-def test_a_slanted_view_is_found_as_slanted_as_it_is():
+@pytest.mark.parametrize("smoke", [0.0, 0.2])
+def test_a_slanted_view_is_found_as_slanted_as_it_is(smoke):
     cam = camera(96, 72, 1)
     lattice = shading.Lattice.of(cam, 1.0)
     true = 0.1 * lattice.ray[..., 0] - 0.6 * lattice.ray[..., 1]
     paint = 1 + 0.1 * np.random.default_rng(0).standard_normal(lattice.shape)
     light = 0.3 * paint * np.exp(-shading.shading(lattice, true))
-    rgb = np.rint(255 * to_srgb(np.clip(light[..., None] * [1.0, 0.6, 0.5], 0, 1))).astype(np.uint8)[None]
+    seen = (1 - smoke) * np.clip(light[..., None] * [1.0, 0.6, 0.5], 0, 1) + 0.35 * smoke
+    rgb = np.rint(255 * to_srgb(seen)).astype(np.uint8)[None]
     none = np.zeros(rgb.shape[:3], bool)
     z, _ = near_light.estimate(rgb, none, none, cam)
     flat = np.concatenate([lattice.ray.reshape(-1, 2), np.ones((true.size, 1))], -1)

@@ -20,6 +20,7 @@ import numpy as np
 
 from surgisim.artifacts.camera import Camera
 from surgisim.lighting.headlight import to_linear
+from surgisim.lighting.veil import veil_of
 from surgisim.perception.depth.pull import Watched, nearer
 from surgisim.perception.depth.shading import Lattice, explain, shading
 from surgisim.perception.tracking.spread import spread
@@ -29,6 +30,10 @@ TRUST = 0.5
 """Confidence of a well explained pixel: brightness tells changes well and shapes only roughly."""
 ALBEDO, HUE = 0.25, 0.3
 """Spread of log albedo that hue does not explain; of the hue's coefficients."""
+ABOVE = 0.1
+"""Share of the veil's own light that tissue must send in every channel: what is darker, the veil drowns."""
+TURNS = 20
+"""How often shape and albedo take turns: where tissue lies steep, six left a sixth of the slope unfound."""
 FIRST_DETAIL = 0.6
 """Finest wave of shape that is believed, as a share of the longer image side."""
 
@@ -66,13 +71,14 @@ def estimate(
     """
     ratio = min(1.0, size / max(rgb.shape[1:3]))
     lattice = Lattice.of(camera, ratio)
-    light, hue, known = _read(rgb[0], hidden[0] | specular[0], lattice.shape)
+    grey = veil_of(rgb, hidden | specular)
+    light, hue, known = _read(rgb[0], hidden[0] | specular[0], lattice.shape, grey)
     rest = _first(lattice, light, hue, known, relief)
     rest += np.log(distance) - np.median(rest[known > 0.5] if (known > 0.5).any() else rest)
     albedo = light + shading(lattice, rest)
     frames, watched, alone = [], [], rest - np.median(rest)
     for t, warp in enumerate(follow_surface(rgb, hidden)):
-        now = _read(rgb[t], hidden[t] | specular[t], lattice.shape)
+        now = _read(rgb[t], hidden[t] | specular[t], lattice.shape, grey)
         alone = _first(lattice, *now, relief, begin=alone, turns=1) if t else alone
         position, sure = _placed(warp, lattice)
         frames.append((sure, now, alone))
@@ -131,11 +137,15 @@ def linear_light(rgb: np.ndarray) -> np.ndarray:
     return to_linear(level).astype(np.float32)[rgb]
 
 
-def _read(rgb: np.ndarray, covered: np.ndarray, shape: tuple[int, int]):
-    """Log brightness (h, w), hue (h, w, 2) and the share of usable pixels (h, w) on the small lattice."""
-    usable = ~covered & (rgb.max(-1) < 250) & (rgb.max(-1) > 8)
+def _read(rgb: np.ndarray, covered: np.ndarray, shape: tuple[int, int], grey: float):
+    """Log brightness (h, w), hue (h, w, 2) and the share of usable pixels (h, w) on the small lattice.
+
+    grey: the veil before the tissue, linear light 0-1.
+    """
+    linear = linear_light(rgb) - grey
+    usable = ~covered & (rgb.max(-1) < 250) & (rgb.max(-1) > 8) & (linear.min(-1) >= ABOVE * grey)
     share = _shrink(usable, shape)
-    mean = _shrink(linear_light(rgb) * usable[..., None], shape) / np.maximum(share, 1e-6)[..., None]
+    mean = _shrink(linear * usable[..., None], shape) / np.maximum(share, 1e-6)[..., None]
     mean = np.maximum(spread(mean, share), 1e-5)
     hue = np.log(mean[..., :1] / mean[..., 1:])
     return np.log(mean.mean(-1)).astype(float), hue.astype(float), share.astype(float)
@@ -149,7 +159,7 @@ def _first(
     relief: float,
     *,
     begin: np.ndarray | None = None,
-    turns: int = 6,
+    turns: int = TURNS,
 ) -> np.ndarray:
     """Log depth of one frame by itself, about 0: shape and hue's share of the albedo in turns."""
     log_z, use = np.zeros_like(light) if begin is None else begin, known > 0.5
@@ -178,9 +188,15 @@ def _first(
 
 
 def _plane(lattice: Lattice, log_z: np.ndarray) -> np.ndarray:
-    """The mean slope of log depth as a plane about 0, (h, w): tissue may lie slanted to the view."""
+    """The log depth of a plane that lies as the surface does, about 0, (h, w): tissue may be slanted to the view."""
     flat = np.concatenate([lattice.ray.reshape(-1, 2), np.ones((log_z.size, 1))], -1)
-    plane = (flat @ np.linalg.lstsq(flat, log_z.ravel(), rcond=None)[0]).reshape(log_z.shape)
+    # The inverse depth of a plane is linear across the view. Its fit to positive numbers is positive but for shapes that
+    # no recording shows; there the plane is one of log depth.
+    inverse = flat @ np.linalg.lstsq(flat, np.exp(-log_z.ravel()), rcond=None)[0]
+    if inverse.min() > 0:
+        plane = -np.log(inverse).reshape(log_z.shape)
+    else:
+        plane = (flat @ np.linalg.lstsq(flat, log_z.ravel(), rcond=None)[0]).reshape(log_z.shape)
     return plane - np.median(plane)
 
 
