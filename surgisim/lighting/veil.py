@@ -26,7 +26,10 @@ STEEPEST = 0.8
 
 
 def veil_of(rgb: np.ndarray, spoilt: np.ndarray) -> float:
-    """Linear light 0-1 that is added to a recording; rgb: sRGB, (T, H, W, 3) uint8, spoilt: no tissue, (T, H, W) bool."""
+    """Linear light 0-1 that is added to a recording.
+
+    rgb: sRGB, (T, H, W, 3) uint8. spoilt: pixels that show no tissue of their own, (T, H, W) bool.
+    """
     ratio = min(1.0, SIZE / max(rgb.shape[1:3]))
     wide, high = (max(round(n * ratio), 1) for n in rgb.shape[2:0:-1])
     seen = []
