@@ -190,8 +190,8 @@ def _first(
 def _plane(lattice: Lattice, log_z: np.ndarray) -> np.ndarray:
     """The log depth of a plane that lies as the surface does, about 0, (h, w): tissue may be slanted to the view."""
     flat = np.concatenate([lattice.ray.reshape(-1, 2), np.ones((log_z.size, 1))], -1)
-    # The inverse depth of a plane is linear across the view. Its fit to positive numbers is positive but for shapes that
-    # no recording shows; there the plane is one of log depth.
+    # The inverse depth of a plane is linear across the view. Its fit to positive numbers is positive but for shapes
+    # that no recording shows; there the plane is one of log depth.
     inverse = flat @ np.linalg.lstsq(flat, np.exp(-log_z.ravel()), rcond=None)[0]
     if inverse.min() > 0:
         plane = -np.log(inverse).reshape(log_z.shape)
