@@ -26,13 +26,15 @@ NEAR = 0.1
 """Spread of the held ball's centre, each way, about where most motion is seen, as a share of the distance."""
 TILT = 0.1
 """Spread of the slope of the whole surface, each way, about that which frame 0's brightness suggests."""
-MATTE, MATTE_SPREAD = 0.85, 0.15
+MATTE, MATTE_SPREAD = 0.7, 0.15
 """How far brightness follows the angle, against a wholly matte surface without other light, and its spread."""
 ACROSS, SHAPE, FAR = 0.15, 0.12, 0.25
 """Errors of the motion across the view: of the tracking [px of the lattice], and of the layer's as shares of the motion
 nearby and of the largest motion."""
 LIGHT = 0.05
-"""Spread of log brightness along a tissue point's way."""
+"""Least spread of log brightness along a tissue point's way; more where still tissue's changes more."""
+ENOUGH = 20
+"""Lattice pixels of still tissue that tell how light changes without motion."""
 ALIKE = 20.0
 """Lattice pixels whose errors go together."""
 FULL, LIVELY = 0.8, 0.1
@@ -106,10 +108,12 @@ def nearer(lattice: Lattice, rest: np.ndarray, watched: Watched) -> tuple[np.nda
     if largest < VISIBLE * pixel:
         return change, watched.ray
     lit = watched.lit * watched.lit[0] * watched.sure
-    brighter = _without_gain(watched.light - watched.light[0], lit, np.linalg.norm(across, axis=-1) < pixel / 2)
+    still = (lit > 0.5) & (np.linalg.norm(across, axis=-1) < pixel / 2)
+    brighter = _without_gain(watched.light - watched.light[0], still)
+    restless = _restless(brighter, still)
     around = _smooth(size, sure, lattice.shape)
     noise = np.hypot(np.hypot(ACROSS * pixel, SHAPE * around), FAR * largest) * np.sqrt(ALIKE)
-    lively = (around > LIVELY * largest) / (LIGHT * np.sqrt(ALIKE))
+    lively = (around > LIVELY * largest) / np.sqrt(ALIKE)
     full = course > FULL
     scene = _Scene(
         lattice,
@@ -120,7 +124,7 @@ def nearer(lattice: Lattice, rest: np.ndarray, watched: Watched) -> tuple[np.nda
         pattern,
         (lit[full] * brighter[full]).sum(0) / np.maximum(lit[full].sum(0), 1e-6),
         np.sqrt(sure) / noise,
-        lit[full].mean(0) * lively,
+        lit[full].mean(0) * lively / np.hypot(LIGHT, np.median(restless[full])),
     )
     best = _fitted(scene, tissue[np.argmax(around), :2], pattern)
     place = watched.ray.copy()
@@ -131,7 +135,7 @@ def nearer(lattice: Lattice, rest: np.ndarray, watched: Watched) -> tuple[np.nda
             across=across[t],
             brighter=brighter[t],
             weight_across=np.where(watched.sure[t] > CLEAR, watched.sure[t], 0.0) / noise,
-            weight_light=lit[t] * lively,
+            weight_light=lit[t] * lively / np.hypot(LIGHT, restless[t]),
         )
         moved, explained = _moved(now, best, share)
         change[t] = np.log1p(np.maximum(explained * moved[:, 2] / z, -0.8)).reshape(lattice.shape)
@@ -167,10 +171,17 @@ def _shared(across: np.ndarray, sure: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return pattern, course, (sure * course[:, None] ** 2).sum(0) / max((course**2).sum(), 1e-12)
 
 
-def _without_gain(brighter: np.ndarray, lit: np.ndarray, unmoved: np.ndarray) -> np.ndarray:
-    """Changes (T, K) less what tissue that stands still does: exposure and lamp."""
-    gain = [np.median(b[s]) if s.sum() > 20 else 0.0 for b, s in zip(brighter, (lit > 0.5) & unmoved, strict=True)]
+def _without_gain(brighter: np.ndarray, still: np.ndarray) -> np.ndarray:
+    """Changes (T, K) less what tissue that stands still, (T, K) bool, does: exposure and lamp."""
+    gain = [np.median(b[s]) if s.sum() > ENOUGH else 0.0 for b, s in zip(brighter, still, strict=True)]
     return brighter - np.array(gain)[:, None]
+
+
+def _restless(brighter: np.ndarray, still: np.ndarray) -> np.ndarray:
+    """Spread of the change of brightness where tissue stands still, in every frame, (T,): smoke that drifts, say."""
+    return np.array(
+        [1.4826 * np.median(np.abs(b[s])) if s.sum() > ENOUGH else 0.0 for b, s in zip(brighter, still, strict=True)]
+    )
 
 
 def _smooth(values: np.ndarray, weight: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
