@@ -1,5 +1,7 @@
 """Depth's change of pulled tissue, on soft layers whose pull is planted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pulled_sheet import camera
@@ -52,6 +54,20 @@ def test_a_planted_pull_is_found_along_the_view(lattice, layer, pull):
     rest, watched, change = _pulled(lattice, layer, np.array(pull))
     found, _ = nearer(lattice, rest, watched)
     assert np.sqrt(((found - change) ** 2).sum() / (change**2).sum()) < 0.15
+
+
+def test_light_that_changes_where_nothing_moves_counts_for_less(lattice, layer, monkeypatch):
+    rest, watched, change = _pulled(lattice, layer, np.array([0.09, -0.03, 0.06]))
+    time = np.arange(len(COURSE))[:, None]
+    smoke = 0.3 * np.sin(9 * watched.ray[0, :, 0] + 6 * watched.ray[0, :, 1] + 0.9 * time)
+    smoky = replace(watched, light=watched.light + smoke)
+
+    def off() -> float:
+        return np.sqrt(((nearer(lattice, rest, smoky)[0] - change) ** 2).sum() / (change**2).sum())
+
+    counted = off()
+    monkeypatch.setattr("surgisim.perception.depth.pull._restless", lambda brighter, still: np.zeros(len(brighter)))
+    assert counted < 0.4 < 0.6 < off()
 
 
 def test_where_nothing_moves_nothing_comes_nearer(lattice, layer):
