@@ -142,16 +142,17 @@ def estimate(
     x, history, table = trial.wanted.start, [], {}
     progress = _onward(progress)
     trial, run = settle_grip(trial, x, history)
-    default = trial.stand(x)[0].observation
+    default, edges = trial.stand(x)[0].observation, [trial]
     if trial.laying:
         rim = seen_rim(tracks, motion, camera, body.spacing) if settings.seen_rim else None
-        trial, x = choose_support(trial, rim, phase, history, progress)
-        trial, _ = settle_grip(trial, x, history)
+        edges, x = choose_support(trial, rim, phase, history, progress)
+        edges = [settle_grip(one, x, history)[0] for one in edges]
+        trial = edges[0]
         default = replace(default, weight=np.where(trial.observation.weight > 0, default.weight, 0.0))
     before = {name: default.error(run.u, at) for name, at in parts.items()}
     before_each = default.each(run.u, held_out)
     if settings.enabled and wanted.free:
-        x = settle_pull(trial, x, phase, settings, history, progress)
+        trial, x = settle_pull(edges, x, phase, history, progress)
         x = choose_start(trial, x, history, progress)
         ends = windows(fitted, phase, settings.first_window)
         trial, solution = descend(trial, x, ends, settings, history, progress)

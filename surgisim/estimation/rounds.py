@@ -36,6 +36,8 @@ SWINGS = 4
 """How many swings of the tissue the shortest pull lasts at least, where its shape alone is asked for."""
 MOVED = 0.9
 """Share of the misfit elsewhere below which a body is taken to be moved by what its edge is seen to do."""
+ASKED, CLOSE = 2, 1.1
+"""Edges at most to which the shape of a pull is fitted, and the share of the best one's misfit within which one is."""
 PULLS = 4
 """Most iterations on the shape of a pull, before its release is looked at."""
 SETTLED = 4
@@ -83,8 +85,11 @@ def settle_grip(trial: Trial, x: np.ndarray, history: list, theta=None) -> tuple
 
 def choose_support(
     trial: Trial, rim: Rim | None, phase: np.ndarray, history: list, say: Say
-) -> tuple[Trial, np.ndarray]:
+) -> tuple[list[Trial], np.ndarray]:
     """The trial with the edge whose pull and hold fit best, and the point to begin from with it.
+
+    Where another edge comes close, that too: with a pull's shape as it is expected, which of them is right may be a
+    matter of chance (see `settle_pull`).
 
     Depth, Poisson's ratio and how far the grip comes nearer all shape the spread of a load, so none is judged alone:
     first these on the most expected edge, then the other edges at the best of them, and the best one with what is seen
@@ -93,7 +98,7 @@ def choose_support(
     wanted, start = trial.wanted, unhurried(trial, trial.wanted.start, phase)
     driven = trial.fitted[phase[trial.fitted] < PHASES.index("release")]
     if not len(driven):
-        return trial, start
+        return [trial], start
     last = int(driven[-1])
     ratios = [k for k, (_, p, _) in enumerate(wanted.free) if p == "nu"]
     nearer = [k for k, name in enumerate(wanted.names) if name.endswith(".toward")]
@@ -122,9 +127,11 @@ def choose_support(
     others = [min(costs), *at_once(cost, [(edge, x) for edge in edges[1:]])]
     for margin, edge, c in zip(margins, EDGES, others, strict=True):
         history.append({"round": "edge", "beyond": margin, "rim": edge.rim, "cost": number(c)})
-    best = edges[int(np.argmin(others))]
+    order = [k for k in np.argsort(others)[:ASKED] if others[k] <= CLOSE * min(others)] or [0]
+    close = [edges[k] for k in order]
+    best = close[0]
     if rim is None:
-        return best, x
+        return close, x
     # What says where patches go is no evidence that they do.
     observation = rim.leaves(best.observation, best.motion)
     alone = replace(best, observation=observation, laying=replace(best.laying, observation=observation, kept={}))
@@ -140,22 +147,23 @@ def choose_support(
     for one, c in zip(tried, along, strict=True):
         told = {"patches": len(rim.radius), "base": one.laying.base, "grip": one.grip}
         history.append({"round": "edge"} | told | {"without": number(without), "cost": number(c)})
-    return (tried[int(np.argmin(along))] if min(along) < MOVED * without else best), x
+    return ([tried[int(np.argmin(along))]] if min(along) < MOVED * without else close), x
 
 
 def settle_pull(
-    trial: Trial, x: np.ndarray, phase: np.ndarray, settings: Estimation, history: list, say: Say
-) -> np.ndarray:
-    """x with what shapes a pull and its hold fitted to them: all but moduli, viscosities and moments of release.
+    trials: list[Trial], x: np.ndarray, phase: np.ndarray, history: list, say: Say
+) -> tuple[Trial, np.ndarray]:
+    """Of trials that differ by their edge the one whose pull and hold fit best, and x with their shape fitted to them.
 
-    Displacement-driven tissue takes its shape whatever its modulus, which only a release tells; where the shape is
-    off, a release misfits by more than any modulus could mend, and the wrong one looks as good as the right one.
+    All is fitted but moduli, viscosities and moments of release: displacement-driven tissue takes its shape whatever
+    its modulus, which only a release tells; where the shape is off, a release misfits by more than any modulus could
+    mend, and the wrong one looks as good as the right one. The first trial and x where there is nothing to fit.
     """
-    wanted = trial.wanted
-    driven = trial.fitted[phase[trial.fitted] < PHASES.index("release")]
+    wanted = trials[0].wanted
+    driven = trials[0].fitted[phase[trials[0].fitted] < PHASES.index("release")]
     slow = np.array([not name.endswith((".E", ".eta", ".release")) for name in wanted.names])
     if not len(driven) or not slow.any() or slow.all():
-        return x
+        return trials[0], x
     last = int(driven[-1])
     low, high = wanted.bounds
 
@@ -164,22 +172,28 @@ def settle_pull(
         z[slow] = y
         return z
 
-    def said(iteration: int, y: np.ndarray, cost: float) -> None:
-        values = {n: float(f"{v:.4g}") for n, v in plain(wanted, whole(y)).items()}
-        history.append({"round": "pull", "last_frame": last, "iteration": iteration, "cost": cost} | values)
-        say(0.06 + 0.06 * iteration / PULLS, 1.0, f"shape of the pull, iteration {iteration}: {values}")
+    def settled(k: int, trial: Trial) -> tuple[float, Trial, np.ndarray]:
+        def said(iteration: int, y: np.ndarray, cost: float) -> None:
+            values = {n: float(f"{v:.4g}") for n, v in plain(wanted, whole(y)).items()}
+            history.append({"round": "pull", "last_frame": last, "iteration": iteration, "cost": cost} | values)
+            done = (k + iteration / PULLS) / len(trials)
+            say(0.06 + 0.06 * done, 1.0, f"shape of the pull, iteration {iteration}: {values}")
 
-    try:
-        found = gauss_newton(
-            lambda y, worker: trial.residual(whole(y), worker, last), x[slow], prior=wanted.start[slow],
-            spread=wanted.spread[slow], differences=wanted.differences[slow], bounds=(low[slow], high[slow]),
-            share=INDEPENDENT, iterations=PULLS, workers=WORKERS, said=said,
-            together=lambda ys: trial.together([whole(y) for y in ys], last),
-        )  # fmt: skip
-    except Breakdown as breakdown:
-        history.append({"round": "pull", "last_frame": last, "cost": None, "broke": str(breakdown)})
-        return x
-    return whole(found.x)
+        try:
+            found = gauss_newton(
+                lambda y, worker: trial.residual(whole(y), worker, last), x[slow], prior=wanted.start[slow],
+                spread=wanted.spread[slow], differences=wanted.differences[slow], bounds=(low[slow], high[slow]),
+                share=INDEPENDENT, iterations=PULLS, workers=WORKERS, said=said,
+                together=lambda ys: trial.together([whole(y) for y in ys], last),
+            )  # fmt: skip
+        except Breakdown as breakdown:
+            history.append({"round": "pull", "last_frame": last, "cost": None, "broke": str(breakdown)})
+            return np.inf, trial, x
+        there = whole(found.x)
+        return cost_of(found.residual, there, wanted), trial, there
+
+    _, trial, there = min((settled(k, trial) for k, trial in enumerate(trials)), key=lambda one: one[0])
+    return trial, there
 
 
 def descend(
