@@ -28,7 +28,7 @@ def edge(ratio: float, stays: float) -> SimpleNamespace:
 
 
 def test_the_edge_that_fits_best_in_the_end_is_kept():
-    near, right = edge(0.0, 0.9), edge(-0.1, 0.3)
+    near, right = edge(0.0, 0.7), edge(-0.1, 0.3)
     assert np.linalg.norm(near.residual(WANTED.start)) < np.linalg.norm(right.residual(WANTED.start))
     history, told = [], []
     trial, x = settle_pull([near, right], WANTED.start, PHASE, history, lambda done, of, what: told.append(done / of))
