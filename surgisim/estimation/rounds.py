@@ -36,8 +36,8 @@ SWINGS = 4
 """How many swings of the tissue the shortest pull lasts at least, where its shape alone is asked for."""
 MOVED = 0.9
 """Share of the misfit elsewhere below which a body is taken to be moved by what its edge is seen to do."""
-ASKED, CLOSE = 2, 1.1
-"""Edges at most to which the shape of a pull is fitted, and the share of the best one's misfit within which one is."""
+CLOSE = 1.1
+"""Share of the best edge's misfit up to which the best of the other kind, held or free, is asked about too."""
 PULLS = 4
 """Most iterations on the shape of a pull, before its release is looked at."""
 SETTLED = 4
@@ -127,8 +127,10 @@ def choose_support(
     others = [min(costs), *at_once(cost, [(edge, x) for edge in edges[1:]])]
     for margin, edge, c in zip(margins, EDGES, others, strict=True):
         history.append({"round": "edge", "beyond": margin, "rim": edge.rim, "cost": number(c)})
-    order = [k for k in np.argsort(others)[:ASKED] if others[k] <= CLOSE * min(others)] or [0]
-    close = [edges[k] for k in order]
+    # Held sides look like a shallower base and the other way round: of either kind the best, if they are close.
+    kinds = [[k for k, edge in enumerate(EDGES) if edge.rim == held] for held in (False, True)]
+    order = sorted((min(kind, key=lambda k: others[k]) for kind in kinds), key=lambda k: others[k])
+    close = [edges[k] for k in order if others[k] <= CLOSE * others[order[0]]]
     best = close[0]
     if rim is None:
         return close, x
