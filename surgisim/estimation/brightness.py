@@ -19,11 +19,11 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from surgisim.estimation.whiten import inverse_root
-from surgisim.lighting.headlight import facing
+from surgisim.lighting.headlight import MATTE, facing
 from surgisim.mpm.simulator import Simulator
 
-MATTE, MATTE_SPREAD = 0.7, 0.25
-"""How far brightness follows the angle, against a wholly matte surface without other light, and its spread."""
+MATTE_SPREAD = 0.25
+"""Spread of how far brightness follows the angle, about what is expected of it."""
 LEANING = 0.15
 """Spread of the slope of the whole surface at rest, each way, where its depth is guessed."""
 AROUND = 12

@@ -5,9 +5,9 @@ import numpy as np
 
 from surgisim.artifacts.masks import Masks
 from surgisim.estimation.brightness import Brightness, carry_of, tangents_of
-from surgisim.lighting.veil import veil_of
+from surgisim.lighting.headlight import linear_light
+from surgisim.lighting.veil import ABOVE, veil_of
 from surgisim.mpm.simulator import Simulator
-from surgisim.perception.depth.near_light import ABOVE, linear_light
 from surgisim.perception.tracking.between import sample
 from surgisim.perception.tracking.flow_chain import widen
 

@@ -11,6 +11,10 @@ does but not with the angle. What is turned away from the lamp gets that share o
 
 import numpy as np
 
+MATTE = 0.7
+"""How far the brightness of tissue follows the angle, against a wholly matte surface without other light: what is
+expected where it is not fitted. Tried against .85 on twelve clips of family 8086 in depth's change: 56 % off for 61."""
+
 
 def facing(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Cosine of the angle between normals (..., 3) and the way from points [m], (..., 3), to the camera; (...)."""
@@ -47,6 +51,12 @@ def log_brightness_change(
 def to_linear(srgb: np.ndarray) -> np.ndarray:
     """sRGB 0-1 as linear light 0-1 (IEC 61966-2-1)."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0.0) + 0.055) / 1.055) ** 2.4)
+
+
+def linear_light(rgb: np.ndarray) -> np.ndarray:
+    """sRGB uint8 of any shape as linear light, 0-1, float32."""
+    level = np.arange(256, dtype=np.float32) / 255
+    return to_linear(level).astype(np.float32)[rgb]
 
 
 def to_srgb(light: np.ndarray) -> np.ndarray:

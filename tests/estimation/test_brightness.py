@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from slab import pulled, slab
 
-from surgisim.estimation.brightness import MATTE, Brightness, _whitened, carry_of, headlight, tangents_of
+from surgisim.estimation.brightness import Brightness, _whitened, carry_of, headlight, tangents_of
 from surgisim.estimation.light_along_tracks import brightness
 from surgisim.estimation.whiten import inverse_root
+from surgisim.lighting.headlight import MATTE
 from surgisim.mpm.setup import prepare
 
 LAWS = {"corotated": {"E": 900.0, "nu": 0.4}, "newtonian": {"eta": 1.0}}

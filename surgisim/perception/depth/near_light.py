@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 
 from surgisim.artifacts.camera import Camera
-from surgisim.lighting.headlight import to_linear
-from surgisim.lighting.veil import veil_of
+from surgisim.lighting.headlight import linear_light
+from surgisim.lighting.veil import ABOVE, veil_of
 from surgisim.perception.depth.pull import Watched, nearer
 from surgisim.perception.depth.shading import Lattice, explain, shading
 from surgisim.perception.tracking.spread import spread
@@ -30,8 +30,6 @@ TRUST = 0.5
 """Confidence of a well explained pixel: brightness tells changes well and shapes only roughly."""
 ALBEDO, HUE = 0.25, 0.3
 """Spread of log albedo that hue does not explain; of the hue's coefficients."""
-ABOVE = 0.1
-"""Share of the veil's own light that tissue must send in every channel: what is darker, the veil drowns."""
 TURNS = 20
 """How often shape and albedo take turns: where tissue lies steep, six left a sixth of the slope unfound."""
 FIRST_DETAIL = 0.6
@@ -129,12 +127,6 @@ def _look(lattice, position, sure, now, alone, rest, albedo, origin, focal) -> _
     still = (weight > 0.5) & (moved < 0.5 / focal)
     gain = np.median((excess + shading(lattice, start))[still]) if still.mean() > 0.05 else 0.0
     return _Look(start, np.where(weight > 0, excess - gain, 0.0), weight, origin)
-
-
-def linear_light(rgb: np.ndarray) -> np.ndarray:
-    """sRGB uint8 as linear light, 0-1, float32."""
-    level = np.arange(256, dtype=np.float32) / 255
-    return to_linear(level).astype(np.float32)[rgb]
 
 
 def _read(rgb: np.ndarray, covered: np.ndarray, shape: tuple[int, int], grey: float):

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from surgisim.lighting.headlight import MATTE
 from surgisim.perception.depth.shading import Lattice
 from surgisim.perception.depth.soft_layer import SoftLayer
 
@@ -26,8 +27,8 @@ NEAR = 0.1
 """Spread of the held ball's centre, each way, about where most motion is seen, as a share of the distance."""
 TILT = 0.1
 """Spread of the slope of the whole surface, each way, about that which frame 0's brightness suggests."""
-MATTE, MATTE_SPREAD = 0.7, 0.15
-"""How far brightness follows the angle, against a wholly matte surface without other light, and its spread."""
+MATTE_SPREAD = 0.15
+"""Spread of how far brightness follows the angle, about what is expected of it."""
 ACROSS, SHAPE, FAR = 0.15, 0.12, 0.25
 """Errors of the motion across the view: of the tracking [px of the lattice], and of the layer's as shares of the motion
 nearby and of the largest motion."""
