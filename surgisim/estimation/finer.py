@@ -36,7 +36,7 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
         return trial, solution
     say(0.4, 1.0, f"on a finer grid: {plain(wanted, found.x)}")
     try:
-        J = derivative(fine.together, found.x, found.residual, wanted.differences, wanted.bounds)
+        J = derivative(fine.together, found.x, found.residual, fine.differences, wanted.bounds)
     except Breakdown as breakdown:
         history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
         return trial, solution

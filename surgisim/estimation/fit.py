@@ -44,6 +44,7 @@ from surgisim.estimation.refine import Refined, refine
 from surgisim.estimation.rim import seen_rim
 from surgisim.estimation.rounds import (
     INDEPENDENT,
+    at_ease,
     choose_support,
     descend,
     number,
@@ -133,7 +134,7 @@ def estimate(
     trial = Trial(bodies, wanted, motion, observation, body.held, camera.fps, total, fitted, firm=False)
     if settings.enabled:
         trial = _opened(trial, body, tracks, camera, settings, make)
-        trial = _lit(trial, body, tracks, frames, masks, settings)
+        trial = at_ease(_lit(trial, body, tracks, frames, masks, settings))
     parts = {
         "held_out": held_out,
         "after_release": np.intersect1d(held_out, np.flatnonzero(phase == PHASES.index("release"))),

@@ -114,20 +114,25 @@ def derivative(
 ) -> np.ndarray:
     """Derivative of the residuals r, (R,), at x, (M,), by differences of these sizes, (R, M).
 
-    together(xs): the residuals of several x. Raises Breakdown where neither side of a number can be simulated.
+    A difference of 0 stands for a number that makes none. together(xs): the residuals of several x. Raises Breakdown
+    where neither side of a number can be simulated.
     """
     low, high = bounds
     side = np.where(x + differences <= high, 1.0, -1.0) * differences
-    shifted = together(list(x + np.diag(side)))
-    for m in [m for m, s in enumerate(shifted) if s is None]:
+    asked = np.flatnonzero(side)
+    shifted = dict(zip(asked, together(list(x + np.diag(side)[asked])), strict=True))
+    for m in [m for m, s in shifted.items() if s is None]:
         side[m] = -side[m]
         (shifted[m],) = together([np.clip(x + side[m] * np.eye(len(x))[m], low, high)])
-    if any(s is None for s in shifted):
+    if any(s is None for s in shifted.values()):
         raise Breakdown(
             "estimation: the simulation breaks down a small step beside the current parameters. "
             "Start from stiffer tissue (estimation.start), or check the grip."
         )
-    return np.stack([(s - r) / side[m] for m, s in enumerate(shifted)], -1)
+    J = np.zeros((len(r), len(x)))
+    for m, s in shifted.items():
+        J[:, m] = (s - r) / side[m]
+    return J
 
 
 def misfit(r: np.ndarray) -> float:

@@ -5,17 +5,19 @@ window is twice the last, so all rounds together cost at most twice the last one
 """
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.fft import dct
 
+from surgisim.artifacts.motion import Motion
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.gauss_newton import Solution, gauss_newton, misfit
 from surgisim.estimation.observation import PHASES
 from surgisim.estimation.rim import Rim
-from surgisim.estimation.search import Search
+from surgisim.estimation.search import PRIOR_LOG, Search
 from surgisim.estimation.support import EDGES, MIDDLE, SHARES
 from surgisim.estimation.trial import WORKERS, Trial, at_once
 from surgisim.mpm.grip import runs
@@ -32,8 +34,8 @@ NEARER = (0.0, -0.7, -1.4)
 """How far the grip comes nearer there, in spreads of its prior."""
 GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
 """How firmly instruments may hold, tried in turn."""
-SWINGS = 4
-"""How many swings of the tissue the shortest pull lasts at least, where its shape alone is asked for."""
+INERTIA = 0.02
+"""Share of what a pull moves the tissue by that it may lag for its inertia, where its shape alone is asked for."""
 MOVED = 0.9
 """Share of the misfit elsewhere below which a body is taken to be moved by what its edge is seen to do."""
 CLOSE = 1.1
@@ -46,18 +48,54 @@ SETTLED = 4
 Say = Callable[[float, float, str], None]
 
 
-def unhurried(trial: Trial, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
-    """x, or softer, where the tissue still swings several times as fast as it is pulled: the shapes it takes are then
-    the same, and softer tissue takes longer steps."""
-    loads = runs(phase == PHASES.index("load"))
-    if not loads:
-        return x
-    seconds = min(last - first + 1 for first, last in loads) / trial.fps
-    speed = 4 * SWINGS * trial.depth(x) / seconds
+def hurry(trial: Trial, x: np.ndarray) -> float:
+    """Logarithm of how many times stiffer at x the tissue is than it takes to follow what pulls it with hardly any
+    inertia: 0 at least. Softer tissue takes the same shapes then, and longer steps.
+
+    A body whose slowest swing has the frequency f1 lags what moves it at frequency f by (f / f1)^2 of that motion.
+    """
+    slowest = max((_slowest(path, trial.fps) for path in _paths(trial.motion)), default=np.inf)
     laws, values = choose(trial.bodies[0].terms), trial.wanted.values(x)
     alone = {name: law for name, law in laws.items() if law.energy is not None}
     found = shear_speed(alone, {name: law.row(values[name]) for name, law in alone.items()}, trial.bodies[0].density)
-    return np.clip(trial.wanted.paced(x, min(0.0, 2 * np.log(speed / found))), *trial.wanted.bounds)
+    return max(0.0, 2 * float(np.log(found / (4 * trial.depth(x) * slowest))))
+
+
+def _paths(motion: Motion) -> Iterator[np.ndarray]:
+    """Where each grip carries the tissue from where it takes it [m], (T, 3), each time it does."""
+    for active, position in zip(motion.active, motion.position, strict=True):
+        for first, last in runs(active):
+            yield position[first : last + 1] - position[first]
+
+
+def _slowest(path: np.ndarray, fps: float) -> float:
+    """The lowest frequency [Hz] at which a body may swing that lags a path by no more than INERTIA of it."""
+    power = (dct(path, norm="ortho", axis=0) ** 2).sum(1)
+    frequency = np.arange(len(power)) * fps / (2 * len(power))
+    tried = np.geomspace(max(frequency[:2]), 10 * fps, 200)
+    lag = np.minimum(1.0, (frequency / tried[:, None]) ** 2)
+    slow = (power * lag**2).sum(1) <= INERTIA**2 * power.sum()
+    return float(tried[np.argmax(slow)])
+
+
+def unhurried(trial: Trial, x: np.ndarray) -> np.ndarray:
+    """x, or as much softer as does not change the shapes a pull gives, and not softer than may be searched."""
+    return np.clip(trial.wanted.paced(x, -hurry(trial, x)), *trial.wanted.bounds)
+
+
+def at_ease(trial: Trial) -> Trial:
+    """The trial, in which tissue that nothing tells the pace of is simulated no stiffer than its pulls ask for.
+
+    It is never let go, nothing else moves it, and no law remembers how long it has been pulled: it takes the same
+    shapes, whatever its modulus, unless it is softer by more than is to be expected.
+    """
+    held = trial.motion.active
+    free = (held[:, :-1] & ~held[:, 1:]).any()
+    laws = choose(trial.bodies[0].terms).values()
+    hurried = hurry(trial, trial.wanted.start)
+    if free or not trial.calm or any(t.memory for t in laws) or hurried < PRIOR_LOG:
+        return trial
+    return replace(trial, eased=-hurried)
 
 
 def settle_grip(trial: Trial, x: np.ndarray, history: list, theta=None) -> tuple[Trial, Run]:
@@ -95,7 +133,7 @@ def choose_support(
     first these on the most expected edge, then the other edges at the best of them, and the best one with what is seen
     to happen at the edge, where there is a `rim`.
     """
-    wanted, start = trial.wanted, unhurried(trial, trial.wanted.start, phase)
+    wanted, start = trial.wanted, unhurried(trial, trial.wanted.start)
     driven = trial.fitted[phase[trial.fitted] < PHASES.index("release")]
     if not len(driven):
         return [trial], start
@@ -184,7 +222,7 @@ def settle_pull(
         try:
             found = gauss_newton(
                 lambda y, worker: trial.residual(whole(y), worker, last), x[slow], prior=wanted.start[slow],
-                spread=wanted.spread[slow], differences=wanted.differences[slow], bounds=(low[slow], high[slow]),
+                spread=wanted.spread[slow], differences=trial.differences[slow], bounds=(low[slow], high[slow]),
                 share=INDEPENDENT, iterations=PULLS, workers=WORKERS, said=said,
                 together=lambda ys: trial.together([whole(y) for y in ys], last),
             )  # fmt: skip
@@ -229,7 +267,7 @@ def descend(
                     x,
                     prior=wanted.start,
                     spread=wanted.spread,
-                    differences=wanted.differences,
+                    differences=trial.differences,
                     bounds=wanted.bounds,
                     share=INDEPENDENT,
                     iterations=settings.iterations,

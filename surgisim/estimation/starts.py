@@ -58,6 +58,8 @@ def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np
     """
     wanted = trial.wanted
     begin = np.where(wanted.paces, wanted.start, begin)
+    if trial.eased is not None:
+        return begin
     free = freed(wanted.motion(begin, trial.motion), trial.frames)
     if free:
         say(0.13, 1.0, f"reading {len(SOFTER)} moduli off each of {len(DAMPING)} ring-downs")

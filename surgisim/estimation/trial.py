@@ -51,6 +51,9 @@ class Trial:
     """Where bodies come from that are laid anew as the search goes; none where `bodies` stay."""
     error: ModelError | None = None
     """What the simulation gets wrong although its numbers are right."""
+    eased: float | None = None
+    """Logarithm of how many times stiffer (softer, where negative) than at the search's start tissue is simulated
+    whose pace nothing in the clip tells, whatever x says of it; None where x says it."""
 
     def stand(self, x: np.ndarray, worker: int = 0) -> tuple["Trial", Motion]:
         """This trial with the body that x asks for, and how that is carried."""
@@ -74,7 +77,20 @@ class Trial:
     def settled(self, x: np.ndarray) -> Self:
         """The trial of the body and the motion at x, where nothing but the laws' numbers can change any more."""
         here, motion = self.stand(x)
-        return replace(here, motion=motion, wanted=replace(self.wanted, carrying=None, depth=None))
+        return replace(here, motion=motion, wanted=replace(self.wanted, carrying=None, depth=None), eased=None)
+
+    def values(self, x: np.ndarray) -> Values:
+        """The laws' numbers that are simulated at x."""
+        if self.eased is None:
+            return self.wanted.values(x)
+        begin = np.where(self.wanted.paces, self.wanted.start, x)
+        return self.wanted.values(self.wanted.paced(begin, self.eased))
+
+    @property
+    def differences(self) -> np.ndarray:
+        """Steps by which derivatives are taken, (M,); 0 for what makes no difference."""
+        idle = self.wanted.paces & (self.eased is not None)
+        return np.where(idle, 0.0, self.wanted.differences)
 
     def per_frame(self, values: Values, *, safety: float = SAFETY, stiffest=None) -> int:
         """Steps between two frames that are stable for `stiffest` (or `values`)."""
@@ -142,7 +158,7 @@ class Trial:
         return np.concatenate([r, light.residual(u, frames).ravel()]) if light else r
 
     def _run(self, x: np.ndarray, worker: int, last: int | None) -> tuple[Run, Observation]:
-        values = self.wanted.values(x)
+        values = self.values(x)
         here, motion = self.stand(x, worker)
         drive = here.drive(values, motion=motion)
         first = min(self.quiet, last or self.quiet)
@@ -154,7 +170,7 @@ class Trial:
     ) -> tuple[np.ndarray, np.ndarray, Observation]:
         """Nodal displacements at x up to frame `since`, those from it to frame `last` at `within` states a frame [m],
         and what they are compared with."""
-        values = self.wanted.values(x)
+        values = self.values(x)
         here, motion = self.stand(x, worker)
         steps = within * math.ceil(here.per_frame(values) / within)
         drive = here.drive(values, per_frame=steps, motion=motion)
@@ -165,12 +181,16 @@ class Trial:
         return before.after(first).u, after.u, here.observation
 
     @cached_property
+    def calm(self) -> bool:
+        """Whether nothing moves the tissue but what holds it."""
+        laws = choose(self.bodies[0].terms).values()
+        still = all(t.force is None and t.flow is None and t.drive is None and not t.wide for t in laws)
+        return still and not any(self.bodies[0].simulator.gravity)
+
+    @cached_property
     def quiet(self) -> int:
         """The frame up to which nothing moves a body that is laid for a search."""
-        laws = choose(self.bodies[0].terms).values()
-        calm = all(t.force is None and t.flow is None and t.drive is None and not t.wide for t in laws)
-        moved = any(self.bodies[0].simulator.gravity) or len(self.motion.rim)
-        if self.laying is None or not calm or moved:
+        if self.laying is None or not self.calm or len(self.motion.rim):
             return 0
         return max(0, int(np.argmax(self.motion.active.any(0))) - 1)
 
@@ -179,7 +199,7 @@ class Trial:
         if self.bodies[0].simulator.device == "cpu" or self.laying:
             return at_once(lambda x, worker: self.residual(x, worker, last), points)
         last = int(self.fitted[-1]) if last is None else last
-        values = [self.wanted.values(x) for x in points]
+        values = [self.values(x) for x in points]
         # One step for all: the smallest of theirs.
         most = max(self.per_frame(v) for v in values)
         motions = [self.wanted.motion(x, self.motion) for x in points]
