@@ -23,7 +23,11 @@ def edge(ratio: float, stays: float) -> SimpleNamespace:
         return np.concatenate([np.full(3000, 8 * (x[NU] - begin - ratio)), np.full(3000, stays)])
 
     return SimpleNamespace(
-        wanted=WANTED, differences=WANTED.differences, fitted=np.arange(1, 20), residual=residual, together=lambda xs, last: [residual(x) for x in xs]
+        wanted=WANTED,
+        differences=WANTED.differences,
+        fitted=np.arange(1, 20),
+        residual=residual,
+        together=lambda xs, last: [residual(x) for x in xs],
     )
 
 
