@@ -52,7 +52,7 @@ from surgisim.estimation.rounds import (
     settle_pull,
     windows,
 )  # fmt: skip
-from surgisim.estimation.search import Search, search
+from surgisim.estimation.search import PACE, Search, search
 from surgisim.estimation.starts import choose_start
 from surgisim.estimation.stated import by_phase
 from surgisim.estimation.support import EDGES, Support, open_depth
@@ -172,12 +172,12 @@ def estimate(
         wide, wide_x = trial, x
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
     support = Support(trial.depth(x), *edge, len(trial.motion.rim))
-    coarse, uniform = wide.settled(wide_x), wide.wanted.values(wide_x)
+    coarse, uniform = wide.settled(wide_x), wide.values(wide_x)
     values, trial = trial.wanted.values(x), coarse if trial is wide else trial.settled(x)
     theta, refined = trial.theta(values), None
     if settings.enabled:
         # A field shapes what is slow, which the wider grid shows as well, at a fifth of the cost.
-        field, refined = _refined(coarse, uniform, scene, frames, masks, camera, settings, progress)
+        field, refined = _refined(coarse, uniform, wide.eased or 0.0, scene, frames, masks, camera, settings, progress)
         theta = _brought(field, coarse, uniform, trial, values)
     x = x[: len(wanted.free)]
     trial, run = settle_grip(trial, x, history, theta)
@@ -319,7 +319,7 @@ def _brought(field: np.ndarray, coarse: Trial, uniform: Values, trial: Trial, va
     Each particle there is as many times stiffer than `values` as the nearest here is than `uniform`.
     """
     even = coarse.theta(uniform)
-    if trial is coarse:
+    if trial is coarse and values == uniform:
         return field
     ratio = np.where(even != 0, field / np.where(even != 0, even, 1.0), 1.0)
     near = cKDTree(coarse.bodies[0].body.rest).query(trial.bodies[0].body.rest)[1]
@@ -365,6 +365,7 @@ def _nothing_to_learn(motion: Motion, tracks: Tracks, body: Body) -> str:
 def _refined(
     trial: Trial,
     values: Values,
+    eased: float,
     scene: Scene,
     frames: Frames,
     masks: Masks,
@@ -372,7 +373,7 @@ def _refined(
     settings: Estimation,
     progress: Say,
 ) -> tuple[np.ndarray, Refined | None]:
-    """Per-particle parameters where they pay, else the uniform ones."""
+    """Per-particle parameters where they pay, else the uniform ones; eased: as the trial that `values` are of."""
     prepared, fitted = trial.bodies[0], trial.fitted
     theta, names = trial.theta(values), columns(choose(prepared.terms))
     chosen = [names.index(n) for n in settings.field if n in names and n in trial.wanted.names]
@@ -387,10 +388,12 @@ def _refined(
         seen = masks.tissue & ~masks.specular
         image = picture_loss(scene, camera, frames.rgb, seen, prepared.simulator, shown)
     ends = [p for t in choose(prepared.terms).values() for p in t.params.values()]
+    # What is simulated at another pace has its limits there as well.
+    slower = np.exp([PACE.get(p.unit, 0.0) * eased for p in ends])
     refined = refine(
         prepared.simulator, path, theta, chosen, trial.observation, train=train, judge=judge, image=image,
         image_weight=settings.image_weight, iterations=settings.field_iterations, smoothness=settings.smoothness,
-        limits=(np.array([p.low for p in ends]), np.array([p.high for p in ends])),
+        limits=(slower * [p.low for p in ends], slower * [p.high for p in ends]),
         progress=lambda done, of, text: progress(0.8 + 0.15 * done / of, 1.0, text),
     )  # fmt: skip
     return refined.theta, refined
