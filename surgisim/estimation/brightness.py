@@ -135,7 +135,8 @@ def _whitened(r: np.ndarray, columns: np.ndarray, modes: np.ndarray, size: np.nd
 
 
 def tangents_of(rest: np.ndarray) -> np.ndarray:
-    """Along the surface at each point, across the view and down it, (K, 2, 3), from a plane through its neighbours."""
+    """Along the surface at each point, across the view and down it, (K, 2, 3), each of length 1, from a plane through
+    its neighbours."""
     near = cKDTree(rest).query(rest, min(AROUND, len(rest)))[1]
     around = rest[near]
     flat = np.concatenate([around[..., :2] - rest[:, None, :2], np.ones((*near.shape, 1))], -1)
@@ -143,7 +144,9 @@ def tangents_of(rest: np.ndarray) -> np.ndarray:
     slope = np.linalg.solve(gram, np.swapaxes(flat, 1, 2) @ around[..., 2:])[:, :2, 0]
     one, zero = np.ones(len(rest)), np.zeros(len(rest))
     right, down = np.stack([one, zero, slope[:, 0]], -1), np.stack([zero, one, slope[:, 1]], -1)
-    return np.stack([right, down], 1)
+    both = np.stack([right, down], 1)
+    # Beside a fold a slope has no bound, but places along it must not leave the tissue.
+    return both / np.linalg.norm(both, axis=-1, keepdims=True)
 
 
 def carry_of(simulator: Simulator, rest: np.ndarray, tangents: np.ndarray, step: float) -> sparse.csr_matrix:

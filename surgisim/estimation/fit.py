@@ -278,7 +278,7 @@ def _weighed(
     chosen = better(solution, wanted, found, trial.regions)
     if chosen:
         begun = replace(found[0], one=Otherwise("as first found", first, rival=True), x=solution.x)
-        found = [a for a in found if a not in (chosen, found[0])] + [begun] * (chosen is not found[0])
+        found = [a for a in found[1:] if a is not chosen] + [begun] * (chosen is not found[0])
         trial, solution = descend(
             chosen.one.trial, chosen.x, ends, settings, history, progress, jacobian=chosen.jacobian
         )

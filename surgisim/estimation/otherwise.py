@@ -94,12 +94,12 @@ def rivals(trial: Trial, x: np.ndarray) -> Iterator[Otherwise]:
     """What may take the place of a fit with a body laid for it that ended at x, (M,); first that itself, once more."""
     yield Otherwise(AS_IT_IS, trial, rival=True)
     laying = trial.laying
-    for edge in EDGES:
-        margin = edge.margin(trial.wanted.depth, laying.columns.spacing)
-        if (margin, edge.rim) != (laying.margin, laying.rim):
+    ends = {(edge.margin(trial.wanted.depth, laying.columns.spacing), edge.rim): None for edge in EDGES}
+    for margin, rim in ends:
+        if (margin, rim) != (laying.margin, laying.rim):
             yield Otherwise(
-                f"{margin * 1e3:.0f} mm beyond the picture, {'held' if edge.rim else 'free'}",
-                replace(trial, laying=laying.ending(margin, edge.rim)),
+                f"{margin * 1e3:.0f} mm beyond the picture, {'held' if rim else 'free'}",
+                replace(trial, laying=laying.ending(margin, rim)),
                 rival=True,
             )
     flat = not laying.columns.flat

@@ -132,3 +132,12 @@ def test_light_follows_its_points_to_another_view():
     tilted = rest + np.outer(0.2 * rest[:, 0], [0.0, 0.0, 1.0])
     assert light.placed(tilted).tangents[:, 0, 2] == pytest.approx(0.2, abs=0.01)
     assert replace(light, rest=rest).tangents[:, 0, 2] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_places_along_a_fold_stay_beside_its_points():
+    rng = np.random.default_rng(0)
+    rest = np.concatenate([rng.uniform(-0.01, 0.01, (80, 2)), np.full((80, 1), 0.05)], 1)
+    rest[:, 2] += np.where(rest[:, 0] > 0, 0.02, 0.0)
+    tangents = tangents_of(rest)
+    assert np.linalg.norm(tangents, axis=-1) == pytest.approx(1.0)
+    assert np.abs(tangents[..., 2]).max() > 0.7

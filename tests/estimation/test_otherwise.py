@@ -4,10 +4,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from slab import slab
+from slab_clip import CAMERA
 
 from surgisim.estimation.gauss_newton import Solution
-from surgisim.estimation.otherwise import Otherwise, answers, better, shares
+from surgisim.estimation.lay import Laying, upright
+from surgisim.estimation.otherwise import Otherwise, answers, better, rivals, shares
 from surgisim.estimation.search import Search, search
+from surgisim.estimation.support import open_depth
+from surgisim.estimation.trial import Trial
 
 COUNT = 4000
 REGION = np.repeat(np.arange(20), COUNT // 20)
@@ -124,6 +129,19 @@ def test_a_fit_gives_way_to_a_far_more_probable_one_only():
     assert better(worse, trial.wanted, answers(worse, changed, silent, REGION), REGION).one is changed[0]
     same = Solution(trial.wanted.start, off, trial.slope)
     assert better(same, trial.wanted, answers(same, changed, silent, REGION), REGION) is None
+
+
+def test_no_edge_is_asked_about_twice():
+    body = slab()
+    laid = upright(body, CAMERA)
+    wanted = replace(search(["corotated", "newtonian"], {}, []), depth=open_depth(laid))
+    # Tissue of so few cells that two margins are as many of them.
+    columns = replace(laid, spacing=wanted.depth.size)
+    laying = Laying(columns, columns.spacing, True, None, None)
+    trial = Trial([], wanted, None, None, None, 25.0, 2, np.arange(2), laying=laying)
+    asked = [one.about for one in rivals(trial, wanted.start)]
+    assert len(asked) == len(set(asked))
+    assert sum("beyond" in about for about in asked) == 3
 
 
 def silent(*_):
