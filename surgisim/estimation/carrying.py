@@ -15,9 +15,12 @@ from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
 from surgisim.estimation.unknown import RELAID, Unknown
 
-TOWARD, TOWARD_MEASURED = 0.08, 0.01
-"""Spread of how far a grip comes nearer, as a share of its distance: a pull of some 5 to 10 mm at 50 to 100 mm, and
-what is left open of it where depth is measured in every frame."""
+TOWARD, TOWARD_READ, TOWARD_MEASURED = 0.08, 0.03, 0.01
+"""Spread of how far a grip comes nearer, as a share of its distance: a pull of some 5 to 10 mm at 50 to 100 mm; what is
+left open of it where depth's change was read off brightness and motion (on 79 clips of families 8086 and 31415 it is
+.026 off, root mean square, and .005 on average), and where it was measured in every frame."""
+LEVEL = 1e-4
+"""Share of its distance below which a found path does not come nearer: nothing was read off."""
 BESIDE = 0.5
 """Spread of where the held ball's middle is across the view, each way, as a share of its radius: jaws hide it."""
 ACROSS, RADIUS = 0.08, 0.2
@@ -74,29 +77,44 @@ def named(grip: int, what: str) -> str:
 def carrying(motion: Motion, tracks: Tracks, camera: Camera, measured: bool) -> Carrying:
     """What is open of every grip.
 
-    measured: whether depth's change is, so that the path along the view is known to a little; otherwise the one found
-    is left aside.
+    measured: whether depth's change is, so that the path along the view is known to a little; otherwise only how far it
+    goes in all is taken from the one found, and how it goes in time from what is seen across the view.
     """
     unknowns: list[Unknown] = []
-    toward = TOWARD_MEASURED if measured else TOWARD
+    share = course(tracks, motion)
     longer, larger = (LONGER, LARGER) if motion.source == "found" else (0.0, 0.0)
     for j, center in enumerate(motion.center_rest):
         size = float(motion.radius[j])
         beside = BESIDE * size / float(center[2])
+        nearer = 0.0 if measured else _nearer(motion, share, j)
+        toward = TOWARD_MEASURED if measured else TOWARD_READ if abs(nearer) > LEVEL else TOWARD
+        ends = (nearer - 4 * toward, nearer + 4 * toward)
+        # fmt: off
         unknowns += [
-            Unknown(named(j, "toward"), 0.0, toward, -4 * toward, 4 * toward, "m", size=float(center[2])),
+            Unknown(named(j, "toward"), nearer, toward, *ends, "m", size=float(center[2]), before=TOWARD),
             Unknown(named(j, "right"), 0.0, beside, -3 * beside, 3 * beside, "m", size=float(center[2])),
             Unknown(named(j, "down"), 0.0, beside, -3 * beside, 3 * beside, "m", size=float(center[2])),
             Unknown(named(j, "across"), longer, ACROSS, longer - 4 * ACROSS, longer + 4 * ACROSS, "1", True),
             Unknown(
-                named(j, "radius"), larger, RADIUS, larger - 4 * RADIUS, larger + 3 * RADIUS, "m", True, size, RELAID
+                named(j, "radius"), larger, RADIUS, larger - 4 * RADIUS, larger + 3 * RADIUS, "m", True, size=size,
+                difference=RELAID,
             ),
         ]
+        # fmt: on
         if not motion.active[j, -1]:
             unknowns.append(Unknown(named(j, "release"), RELEASE, RELEASE_SPREAD, *RELEASE_ENDS, "frames"))
     if not measured:
         motion = replace(motion, position=_level(motion, camera))
-    return Carrying(motion, camera, course(tracks, motion), tuple(unknowns))
+    return Carrying(motion, camera, share, tuple(unknowns))
+
+
+def _nearer(motion: Motion, share: np.ndarray, grip: int) -> float:
+    """How much farther off a grip is found at the end of the pull, as a share of its distance: negative when nearer."""
+    on = motion.active[grip]
+    gone = share[on] - share[on][0]
+    change = motion.position[grip, on, 2] - motion.position[grip, on, 2][0]
+    distance = float(motion.center_rest[grip, 2])
+    return float((gone * change).sum() / max((gone**2).sum(), 1e-12)) / distance
 
 
 def _level(motion: Motion, camera: Camera) -> np.ndarray:

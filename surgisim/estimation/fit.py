@@ -44,6 +44,7 @@ from surgisim.estimation.refine import Refined, refine
 from surgisim.estimation.rim import seen_rim
 from surgisim.estimation.rounds import (
     INDEPENDENT,
+    ask_rim,
     at_ease,
     choose_support,
     descend,
@@ -145,15 +146,19 @@ def estimate(
     trial, run = settle_grip(trial, x, history)
     default, edges = trial.stand(x)[0].observation, [trial]
     if trial.laying:
-        rim = seen_rim(tracks, motion, camera, body.spacing) if settings.seen_rim else None
-        edges, x = choose_support(trial, rim, phase, history, progress)
+        edges, x = choose_support(trial, phase, history, progress)
         edges = [settle_grip(one, x, history)[0] for one in edges]
         trial = edges[0]
+    searched = settings.enabled and bool(wanted.free)
+    if searched:
+        trial, x = settle_pull(edges, x, phase, history, progress)
+        rim = seen_rim(tracks, motion, camera, body.spacing) if settings.seen_rim and trial.laying else None
+        if rim:
+            trial, x = ask_rim(trial, x, rim, phase, history, progress)
         default = replace(default, weight=np.where(trial.observation.weight > 0, default.weight, 0.0))
     before = {name: default.error(run.u, at) for name, at in parts.items()}
     before_each = default.each(run.u, held_out)
-    if settings.enabled and wanted.free:
-        trial, x = settle_pull(edges, x, phase, history, progress)
+    if searched:
         x = choose_start(trial, x, history, progress)
         ends = windows(fitted, phase, settings.first_window)
         trial, solution = descend(trial, x, ends, settings, history, progress)

@@ -44,10 +44,11 @@ def identifiability(
     """
     J, r, spread, model = solution.jacobian, solution.residual, search.spread, model or {}
     covariance = regional(J, r, independent / spread_of(r), spread, region) + sum(model.values())
+    known = np.append(spread[: len(search.free)], [u.before or u.spread for u in search.open])
     result = {}
     for name, direction, value, unit, logarithmic, size in _quantities(search, solution.x, density, length):
         sd = float(np.sqrt(direction @ covariance @ direction))
-        prior = float(np.sqrt(((direction * spread) ** 2).sum()))
+        prior = float(np.sqrt(((direction * known) ** 2).sum()))
         by_phase = {n: float(((J[phase_of == k] @ direction) ** 2).sum()) for k, n in enumerate(phase_names)}
         total = sum(by_phase.values())
         low, high = (

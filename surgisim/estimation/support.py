@@ -57,4 +57,4 @@ def open_depth(columns: Columns) -> Unknown:
     """The depth at which tissue is held as a number of the fit."""
     middle = MIDDLE * columns.thickness
     low = min(np.log(LEAST * columns.spacing / middle), -SPREAD)
-    return Unknown("held.depth", 0.0, SPREAD, low, np.log(MOST / MIDDLE), "m", True, middle, RELAID)
+    return Unknown("held.depth", 0.0, SPREAD, low, np.log(MOST / MIDDLE), "m", True, middle, difference=RELAID)

@@ -25,5 +25,7 @@ class Unknown:
     """Whether it is the logarithm of a factor."""
     size: float = 1.0
     """What 1 is, in `unit`."""
+    before: float | None = None
+    """What `spread` would be had nothing of the clip been looked at, where that is more."""
     difference: float = DIFFERENCE
     """Step of the differences that its derivative is taken by."""

@@ -39,10 +39,10 @@ def trial(motion: Motion, terms=("corotated", "newtonian"), gravity=(0.0, 0.0, 0
 def test_a_slow_pull_gives_the_same_shapes_in_fewer_steps():
     full = trial(slowly())
     eased, x = at_ease(full), full.wanted.start
-    assert eased.eased == -hurry(full, x) < -PRIOR_LOG
-    assert eased.per_frame(eased.values(x)) < 0.6 * full.per_frame(full.values(x))
+    assert eased.eased == -hurry(full, x) < -0.5
+    assert eased.per_frame(eased.values(x)) < 0.8 * full.per_frame(full.values(x))
     one, other = (t.run(x).u[1:] for t in (full, eased))
-    assert np.linalg.norm(one - other) < 0.03 * np.linalg.norm(one)
+    assert np.linalg.norm(one - other) < 0.01 * np.linalg.norm(one)
 
 
 def test_what_makes_no_difference_is_not_asked_about():

@@ -9,6 +9,7 @@ from slab import pulled
 from slab_clip import CAMERA, QUICK, TRUE, T, clip, silent
 
 from surgisim.config.estimation import Estimation
+from surgisim.estimation.carrying import TOWARD, TOWARD_READ, carrying
 from surgisim.estimation.fit import estimate
 from surgisim.estimation.observation import PHASES, phases
 from surgisim.estimation.rounds import windows
@@ -34,7 +35,8 @@ def test_planted_parameters_are_found_from_a_pull_and_its_release():
         assert fit.identifiability[name]["low"] < true < fit.identifiability[name]["high"], name
     edges = {h["about"]: h["share"] for h in fit.history if h["round"] == "otherwise" and "beyond" in h["about"]}
     assert max(edges.values()) < 0.5
-    assert abs(fit.numerical_damping) < 0.1
+    # A tenth of what the tissue's own viscosity does to its slowest swing, eta w^2 / (2 E).
+    assert abs(fit.numerical_damping) < 0.23
     assert "damps free vibration" in fit.words
 
 
@@ -148,9 +150,22 @@ def test_how_far_the_grip_comes_nearer_is_found_where_depth_is_not_measured():
     case[3] = replace(motion, position=seen)
     _, _, fit, carried, _ = estimate(*case, Estimation(**QUICK), silent)
     nearer = fit.identifiability["grip 0.toward"]
-    assert nearer["value"] == pytest.approx(-0.006, rel=0.15)
+    assert nearer["low"] < -0.006 < nearer["high"]
+    assert nearer["value"] == pytest.approx(-0.006, rel=0.2)
     assert nearer["told"]
     assert carried.position[0, 8, 2] - carried.position[0, 0, 2] == pytest.approx(nearer["value"], rel=0.05)
+
+
+def test_what_a_found_path_says_of_coming_nearer_is_where_the_fit_begins():
+    _, _, tracks, motion, *_, camera = clip(noise=2e-5)
+    for share, spread in ((0.5, TOWARD_READ), (0.0, TOWARD)):
+        position = motion.position.copy()
+        position[..., 2] = 0.06 + share * (position[..., 2] - 0.06)
+        open_, *_ = carrying(replace(motion, position=position), tracks, camera, measured=False).unknowns
+        assert open_.name == "grip 0.toward"
+        assert open_.size * open_.start == pytest.approx(share * -0.006, abs=3e-4)
+        assert open_.spread == spread
+        assert open_.before == TOWARD
 
 
 def test_phases_follow_the_grip():
