@@ -35,8 +35,8 @@ NEARER = (0.0, -1.0, 1.0)
 GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
 """How firmly instruments may hold, tried in turn."""
 INERTIA = 0.005
-"""Share of what a pull moves the tissue by that it may lag for its inertia, where its shape alone is asked for: at .02 a
-slab held 15 mm deep is found held 13.3 mm deep, at .005 14.5 mm, at the pace of its own modulus 14.7 mm."""
+"""Share of what a pull moves the tissue by that it may lag for its inertia, where its shape alone is asked for: at .02
+a slab held 15 mm deep is found held 13.3 mm deep, at .005 14.5 mm, at the pace of its own modulus 14.7 mm."""
 MOVED = 0.9
 """Share of the misfit elsewhere below which a body is taken to be moved by what its edge is seen to do."""
 CLOSE = 1.1
