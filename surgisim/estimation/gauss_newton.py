@@ -40,6 +40,7 @@ def gauss_newton(
     said: Callable[[int, np.ndarray, float], None] = lambda *_: None,
     together: Callable[[list[np.ndarray]], list[np.ndarray | None]] | None = None,
     jacobian: np.ndarray | None = None,
+    renewed: bool = True,
 ) -> Solution:
     """Minimise share sum huber(r(x)) + sum ((x - prior) / spread)^2 by Levenberg-Marquardt.
 
@@ -48,6 +49,7 @@ def gauss_newton(
     residual(x, worker) may be called from `workers` threads at once, each with its own number; it
     returns None where x cannot be simulated, which only a trial step may meet. together(xs) gives the residuals of
     several x at once, where that is quicker. jacobian: a derivative, (R, M), nearly right at x, to begin with.
+    renewed: whether the derivative that is returned must have been taken at the end.
     Nocedal and Wright, Numerical optimization, 2nd ed. (2006), section 10.3; between derivatives by differences, which
     cost a simulation a number, Broyden's update (ibid., section 11.1).
     """
@@ -97,12 +99,14 @@ def gauss_newton(
         J = J + np.outer((best[1] - r - J @ moved) / (moved @ moved), moved)
         x, r, cost, damping = best[0], best[1], best[2], max(best[3], 1e-6)
         said(iteration, x, cost)
+        if iteration == iterations and not renewed:
+            return Solution(x, r, J)
         small = np.abs(moved).max() < 5e-3 or gained < 3e-4
         done = small and fresh
         J, fresh = (jacobian_at(x, r), True) if small or gained < RENEWED else (J, False)
         if done:
             break
-    return Solution(x, r, J if fresh else jacobian_at(x, r))
+    return Solution(x, r, J if fresh or not renewed else jacobian_at(x, r))
 
 
 def derivative(

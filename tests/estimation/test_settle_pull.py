@@ -24,6 +24,7 @@ def edge(ratio: float, stays: float) -> SimpleNamespace:
 
     return SimpleNamespace(
         wanted=WANTED,
+        laying=None,
         differences=WANTED.differences,
         fitted=np.arange(1, 20),
         residual=residual,
