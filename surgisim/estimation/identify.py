@@ -31,6 +31,7 @@ def identifiability(
     independent: float,
     region: np.ndarray,
     model: Mapping[str, np.ndarray] | None = None,
+    wider: float = 1.0,
 ) -> dict:
     """Parameters and groups with 90 % intervals, the share of information from each phase, and whether told.
 
@@ -41,14 +42,16 @@ def identifiability(
     residual was seen, (R,) int.
     model: for what was taken for granted, by its name, what it adds to the parameters' covariance in search space,
     (M, M). Whatever has a fifth of a quantity's variance is named in its `rests_on`, with its share.
+    wider: how many times wider intervals are than all that says, up to what the prior allows.
     """
     J, r, spread, model = solution.jacobian, solution.residual, search.spread, model or {}
     covariance = regional(J, r, independent / spread_of(r), spread, region) + sum(model.values())
     known = np.append(spread[: len(search.free)], [u.before or u.spread for u in search.open])
     result = {}
     for name, direction, value, unit, logarithmic, size in _quantities(search, solution.x, density, length):
-        sd = float(np.sqrt(direction @ covariance @ direction))
-        prior = float(np.sqrt(((direction * known) ** 2).sum()))
+        alone = float(np.sqrt(direction @ covariance @ direction))
+        allowed, prior = (float(np.sqrt(((direction * of) ** 2).sum())) for of in (spread, known))
+        sd = min(wider * alone, max(alone, allowed))
         by_phase = {n: float(((J[phase_of == k] @ direction) ** 2).sum()) for k, n in enumerate(phase_names)}
         total = sum(by_phase.values())
         low, high = (
@@ -60,7 +63,7 @@ def identifiability(
             )
         )
         edge = _at_edge(search, solution.x, direction)
-        owed = {n: float(direction @ c @ direction) / sd**2 for n, c in model.items()}
+        owed = {n: float(direction @ c @ direction) / alone**2 for n, c in model.items()}
         told = sd <= (OPEN_TOLD if name in {u.name for u in search.open} else TOLD) * prior and not edge
         if ".E" in name or ".eta" in name:
             told = told and total > 0 and by_phase.get(FREE, 0.0) > FREELY * total

@@ -9,7 +9,7 @@ from surgisim.estimation.search import search
 from surgisim.estimation.support import Support
 
 
-def told(model=None, phase="release"):
+def told(model=None, phase="release", wider=1.0):
     """The table of a fit whose residuals tell every parameter to a hundredth of its search space."""
     wanted = search(["corotated", "newtonian"], {}, [])
     slope = np.vstack([100 * np.eye(3)] * 50)
@@ -17,7 +17,7 @@ def told(model=None, phase="release"):
     one = np.zeros(len(slope), int)
     return identifiability(
         solution, wanted, phase_of=one, phase_names=(phase,), density=1050.0, length=0.015, independent=0.02,
-        region=np.repeat(np.arange(10), 15), model=model,
+        region=np.repeat(np.arange(10), 15), model=model, wider=wider,
     )  # fmt: skip
 
 
@@ -36,6 +36,17 @@ def test_the_simulations_own_error_belongs_to_every_interval():
 def test_what_the_simulation_itself_gets_wrong_by_much_is_not_told():
     assert told()["corotated.E"]["told"]
     assert not told({"grid": np.diag([0.5, 0.0, 0.0]) ** 2})["corotated.E"]["told"]
+
+
+def test_wider_intervals_are_never_wider_than_the_prior():
+    as_said, wider, widest = told(), told(wider=1.4), told(wider=1e6)
+    wanted = search(["corotated", "newtonian"], {}, [])
+    for name, prior in zip(wanted.names, wanted.spread, strict=True):
+        if name != "corotated.nu":
+            assert width(wider[name]) == pytest.approx(1.4 * width(as_said[name]))
+            assert width(widest[name]) == pytest.approx(prior)
+    wide = {"grid": np.diag([3.0, 0.0, 0.0]) ** 2}
+    assert width(told(wide, wider=1.4)["corotated.E"]) == pytest.approx(width(told(wide)["corotated.E"]))
 
 
 def test_what_an_interval_rests_on_is_named():
