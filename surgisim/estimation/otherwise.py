@@ -21,7 +21,7 @@ from surgisim.estimation.gauss_newton import WIDTH, Solution
 from surgisim.estimation.identify import overstated, spread_of
 from surgisim.estimation.rounds import INDEPENDENT, cost_of
 from surgisim.estimation.search import Search
-from surgisim.estimation.support import EDGES
+from surgisim.estimation.support import edges_of
 from surgisim.estimation.trial import Trial, at_once
 from surgisim.estimation.view import View
 from surgisim.mpm.setup import Prepared
@@ -94,8 +94,7 @@ def rivals(trial: Trial, x: np.ndarray) -> Iterator[Otherwise]:
     """What may take the place of a fit with a body laid for it that ended at x, (M,); first that itself, once more."""
     yield Otherwise(AS_IT_IS, trial, rival=True)
     laying = trial.laying
-    ends = {(edge.margin(trial.wanted.depth, laying.columns.spacing), edge.rim): None for edge in EDGES}
-    for margin, rim in ends:
+    for margin, rim in edges_of(trial.wanted.depth, laying.columns.spacing):
         if (margin, rim) != (laying.margin, laying.rim):
             yield Otherwise(
                 f"{margin * 1e3:.0f} mm beyond the picture, {'held' if rim else 'free'}",

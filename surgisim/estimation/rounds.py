@@ -18,7 +18,7 @@ from surgisim.estimation.gauss_newton import Solution, gauss_newton, misfit
 from surgisim.estimation.observation import PHASES
 from surgisim.estimation.rim import Rim
 from surgisim.estimation.search import Search
-from surgisim.estimation.support import EDGES, MIDDLE, SHARES
+from surgisim.estimation.support import MIDDLE, SHARES, edges_of
 from surgisim.estimation.trial import WORKERS, Trial, at_once
 from surgisim.mpm.grip import runs
 from surgisim.mpm.simulator import Breakdown, Run
@@ -147,9 +147,8 @@ def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> 
     say(0.03, 1.0, f"comparing {len(points)} ways the body may be held")
     costs = at_once(partial(_cost, last=last), [(trial, x) for x in points])
     x = points[int(np.argmin(costs))]
-    # Two margins may be as many cells.
-    ends = dict.fromkeys((e.margin(wanted.depth, trial.laying.columns.spacing), e.rim) for e in EDGES)
-    return [replace(trial, laying=trial.laying.ending(*end)) for end in ends], x
+    found = edges_of(wanted.depth, trial.laying.columns.spacing)
+    return [replace(trial, laying=trial.laying.ending(*end)) for end in found], x
 
 
 def ask_rim(

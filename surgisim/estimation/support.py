@@ -39,6 +39,14 @@ EDGES = (Edge(0.35, False), Edge(0.35, True), Edge(0.8, False), Edge(0.0, False)
 """What is tried, the most expected first: tissue does not end where a picture does."""
 
 
+def edges_of(depth: Unknown, spacing: float) -> list[tuple[float, bool]]:
+    """How far beyond what is seen a body goes [m] and whether it is held there, for each of EDGES.
+
+    Two margins may be as many cells of the grid: then they are one.
+    """
+    return list(dict.fromkeys((edge.margin(depth, spacing), edge.rim) for edge in EDGES))
+
+
 @dataclass(frozen=True)
 class Support:
     """How the body is held."""
