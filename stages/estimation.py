@@ -2,11 +2,13 @@
 
 reads   body.npz, scene.ply, tracks.npz, motion.npz, frames.npz, masks.npz, camera.json
 writes  material.npz (per particle), physics.json (laws, numbers, grid), fit.json (history, identifiability),
-        motion.npz (the grips as fitted), body.npz (the body as it was laid for the fit)
+        motion.npz (the grips as fitted), body.npz (the body as it was laid for the fit), doubts.npz (how tracked points
+        would go were what is open beside the laws otherwise)
 """
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.doubts import Doubts
 from surgisim.artifacts.fit import Fit
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.masks import Masks
@@ -29,7 +31,7 @@ from surgisim.stage import stage
         "masks": Masks,
         "camera": Camera,
     },
-    writes={"material": Material, "physics": Physics, "fit": Fit, "carried": Motion, "laid": Body},
+    writes={"material": Material, "physics": Physics, "fit": Fit, "carried": Motion, "laid": Body, "doubts": Doubts},
     settings=Estimation,
 )
 def main(body, scene, tracks, motion, frames, masks, camera, *, settings, progress):

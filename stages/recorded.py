@@ -1,11 +1,12 @@
 """Put a clip that went through the graph into a recording folder, for the diagnosis.
 
-reads   body.npz, material.npz, physics.json, tracks.npz, motion.npz, frames.npz, camera.json
+reads   body.npz, material.npz, physics.json, tracks.npz, motion.npz, frames.npz, camera.json, doubts.npz
 writes  recording.json, rest.ply, fixed.json, grip.npz, tracks.npz, split.json
 """
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.doubts import Doubts
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.material import Material
 from surgisim.artifacts.motion import Motion
@@ -23,6 +24,7 @@ READS = {
     "motion": Motion,
     "frames": Frames,
     "camera": Camera,
+    "doubts": Doubts,
 }
 
 

@@ -71,10 +71,11 @@ class Clip:
         return self.recording.fps
 
     @property
-    def nominal(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """What the recording says of each point's noise [m], (K,), and of the axes' shares of it, (K, 3) or None."""
-        axes = self.recording.axes
-        return self.recording.sigma[self.kept], None if axes is None else axes[self.kept]
+    def nominal(self) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
+        """What the recording says of each point's noise [m], (K,), of the axes' shares of it, (K, 3), and of their
+        directions, (K, 3, 3); None for what it does not say."""
+        mine = self.recording.of(self.kept)
+        return mine.sigma, mine.axes, mine.ways
 
     @property
     def motion(self) -> Motion:

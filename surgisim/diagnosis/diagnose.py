@@ -262,7 +262,7 @@ def whitened(whiten: Whitener, groups: list[Group], until: int) -> np.ndarray:
 def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts | None = None) -> list[Finding]:
     """Every hypothesis of `parts` (or of all that is cheap) against a whitened residual."""
     residuals = case.space.cleared(np.concatenate([z[:, None].astype(np.float32), nulls], 1))
-    only = worst(case.clip, case.base.simulated) if case.settings.cause == "symptom" else None
+    only = worst(case.clip, case.base.simulated, case.noise) if case.settings.cause == "symptom" else None
     parts, found, source = list(parts or blocks(case.clip, case.base, case.memo, only)), [], 0
     for n, (name, make) in enumerate(parts):
         progress(n / len(parts), f"trying {name} ({n + 1} of {len(parts)})")

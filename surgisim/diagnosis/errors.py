@@ -3,17 +3,19 @@
 import numpy as np
 
 from surgisim.diagnosis import nuisance
+from surgisim.diagnosis.noise import Noise
 from surgisim.diagnosis.saturated import smooth_part
 
 LEAST = 3
 """Frames of rest that a point's constant is told from; seen in fewer, it is told from all that may be fitted."""
 
 
-def residual(case, simulated, nan: bool = True, rest_only: bool = True) -> np.ndarray:
+def residual(case, simulated, nan: bool = True, rest_only: bool = True, whole: bool = False) -> np.ndarray:
     """Recording less prediction less each point's own constant [m], (K, T, 3).
 
     The constant is the mean over the rest before the first grasp: over all fitted frames (`rest_only` False), where it
-    is known better, it takes with it what physics adds to all of them.
+    is known better, it takes with it what physics adds to all of them. What lies along an axis of which the recording
+    is less sure counts as much less (`Noise.told_of`), unless `whole`.
     """
     clip = case.clip
     left = np.where(clip.seen[..., None], clip.moved - simulated, 0.0)
@@ -22,6 +24,7 @@ def residual(case, simulated, nan: bool = True, rest_only: bool = True) -> np.nd
         (constant, count), (instead, _) = (_mean(left, clip.seen, span) for span in (rest, fitted))
         resting = (count >= LEAST) & rest_only
         left = left - np.where(resting[:, None], constant, instead)[:, None]
+    left = left if whole else case.noise.told_of(left)
     return np.where(clip.seen[..., None], left, np.nan if nan else 0.0)
 
 
@@ -55,18 +58,18 @@ def rms(case, simulated) -> tuple[float, float | None]:
     return fitted, 1e3 * float(np.sqrt(np.nanmean(square[:, until:])))
 
 
-def noise_floor(sigma: float) -> float:
-    """RMS distance [mm] of a point from where noise of `sigma` [m] along each axis shows it."""
-    return 1e3 * float(np.sqrt(3)) * sigma
+def noise_floor(noise: Noise) -> float:
+    """RMS distance [mm] of a point from where noise shows it, of what the recording can tell of it."""
+    return 1e3 * float(np.sqrt(3)) * noise.plain
 
 
-def errors(case, before, after, placebo, sigma: float) -> tuple[dict, dict]:
+def errors(case, before, after, placebo, noise: Noise) -> tuple[dict, dict]:
     """What diagnosis.json says of fitted frames and of those held out; placebo None where there is none.
 
     before, after, placebo: predicted displacement of the points [m], (K, T, 3).
     """
     clip, until = case.clip, case.clip.until
-    floor = noise_floor(sigma)
+    floor = noise_floor(noise)
     rows = {name: rms(case, s) for name, s in (("before", before), ("after", after))}
     rows["placebo"] = (None, None) if placebo is None else rms(case, placebo)
     left = residual(case, before, False)

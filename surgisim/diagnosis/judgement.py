@@ -236,7 +236,7 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
 def _unfit(case: Case, fitted: Joint, noise: Noise) -> bool:
     """Whether frames held out are farther off than a recording is beside what it holds, the camera's drift aside."""
     left = rms(case, with_drift(case, fitted.moved))[1]
-    return left is not None and left > calibration.UNFIT * noise_floor(noise.sigma)
+    return left is not None and left > calibration.UNFIT * noise_floor(noise)
 
 
 def _reason(
@@ -346,7 +346,7 @@ def noise_beside(case: Case, after: np.ndarray) -> Noise:
     """The noise with an effect taken off: then quiet frames show it alone."""
     clip, quiet = case.clip, slice(0, case.clip.until)
     return estimate(
-        residual(case, after, False)[:, quiet], clip.seen[:, quiet], clip.rest, clip.quiet()[quiet],
+        residual(case, after, False, whole=True)[:, quiet], clip.seen[:, quiet], clip.rest, clip.quiet()[quiet],
         *clip.nominal,
     )  # fmt: skip
 

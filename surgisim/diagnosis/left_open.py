@@ -67,7 +67,7 @@ def drifted(case: Case, after: np.ndarray | None = None) -> float | None:
 def told(case: Case, after: np.ndarray | None = None) -> list[str]:
     """Sentences on what is no tissue's physics and large all the same; after: as in `drifted`."""
     said, drift = [], drifted(case, after)
-    if drift is not None and drift > LARGE * case.noise.sigma:
+    if drift is not None and drift > LARGE * case.noise.plain:
         said.append(f"Not tissue: the camera drifts by {1e3 * drift:.2g} mm.")
     for j, last in case.clip.releases():
         late = float(case.clip.opening[j, last])

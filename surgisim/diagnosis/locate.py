@@ -22,16 +22,17 @@ def symptom(clip: Clip, noise: Noise, residual: np.ndarray, rng: np.random.Gener
     residual: over the whole clip [m], (K, T, 3).
     """
     smooth = _smoother(clip)
-    draws = np.stack([np.linalg.norm(smooth(noise.draw(clip.rest, clip.frames, rng)), axis=-1) for _ in range(DRAWS)])
+    drawn = (noise.told_of(noise.draw(clip.rest, clip.frames, rng)) for _ in range(DRAWS))
+    draws = np.stack([np.linalg.norm(smooth(field), axis=-1) for field in drawn])
     unit = np.sqrt((draws**2).mean((0, 2)) / 3)[:, None]
     z = np.linalg.norm(smooth(residual), axis=-1) / unit
     return z, float(np.quantile((draws / unit).max((1, 2)), WORST))
 
 
-def worst(clip: Clip, simulated: np.ndarray) -> np.ndarray:
+def worst(clip: Clip, simulated: np.ndarray, noise: Noise) -> np.ndarray:
     """The point that the fitted frames find farthest from where it is predicted, its mean off [m], (3,)."""
     seen = clip.seen[:, : clip.until, None]
-    left = np.where(seen, (clip.moved - simulated)[:, : clip.until], np.nan)
+    left = np.where(seen, noise.told_of(clip.moved - simulated)[:, : clip.until], np.nan)
     left = left - np.nanmean(left, 1, keepdims=True)
     return clip.rest[int(np.nanmean((left**2).sum(-1), 1).argmax())]
 

@@ -97,7 +97,7 @@ def of_base(
     error: what a finer grid changes [m], (K, T, 3); gradient: displacement's [1], (3, K, T, 3); drift: sizes of its
     parts [m], (3,).
     """
-    groups = [*camera(clip, simulated), drifting(clip, drift), places(clip, gradient, noise)]
+    groups = [*camera(clip, simulated), drifting(clip, drift), places(clip, gradient, noise), perceived(clip)]
     return chosen([*groups, simulator(clip, error, settings.model_error)], settings)
 
 
@@ -144,6 +144,13 @@ def positions(groups: list[Group], names: set[str]) -> list[int]:
     return found
 
 
+def perceived(clip: Clip) -> Group:
+    """What the body and the grips were taken to be, as far as the recording says how sure of that it is."""
+    doubts = clip.recording.of(clip.kept).doubts
+    columns = np.stack(list(doubts.values())) if doubts else np.zeros((0, *clip.moved.shape))
+    return Group("perception", columns, tuple((name, 1.0, "standard deviations") for name in doubts))
+
+
 def camera(clip: Clip, simulated: np.ndarray) -> list[Group]:
     """A tracker's lag and scales along three axes."""
     velocity = np.gradient(simulated, axis=1) * clip.fps
@@ -157,7 +164,7 @@ def places(clip: Clip, gradient: np.ndarray, noise: Noise) -> Group:
 
     gradient: displacement's at the points [1], (3, K, T, 3).
     """
-    sigma = noise.sigma * noise.level / np.sqrt((noise.level**2).mean())
+    sigma = noise.sigma * noise.surest / np.sqrt((noise.level**2).mean())
     found = []
     for k, slope in enumerate(np.moveaxis(gradient, 1, 0)):
         seen = slope[:, clip.seen[k]].reshape(3, -1)

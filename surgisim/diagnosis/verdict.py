@@ -66,7 +66,7 @@ def write(
     effects = [_effect(case, r, chances, {m.term for m in members}) for r in members]
     noise, explained = said_of.noise, said_of.explained
     on_shown = replace(case, clip=shown.clip)
-    fit, held_out = errors(on_shown, shown.before, shown.after, shown.placebo, noise.sigma)
+    fit, held_out = errors(on_shown, shown.before, shown.after, shown.placebo, noise)
     say("verdict")
     z, reach = symptom(clip, noise, residual(case, base.simulated, False, rest_only=False), rng)
     freed = case.z - case.space.explained(case.z)
@@ -128,7 +128,7 @@ def write(
 def worse(case: Case, shown: Replay) -> bool:
     """Whether the error of the frames held out rises with what is named, by more than its interval."""
     on_shown = replace(case, clip=shown.clip)
-    high = errors(on_shown, shown.before, shown.after, None, case.noise.sigma)[1]["gain_high"]
+    high = errors(on_shown, shown.before, shown.after, None, case.noise)[1]["gain_high"]
     return high is not None and high < 0
 
 

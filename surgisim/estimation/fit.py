@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.doubts import Doubts
 from surgisim.artifacts.fit import Fit
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.masks import Masks
@@ -21,6 +22,7 @@ from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.carrying import carrying, course
 from surgisim.estimation.damping import numerical_damping
+from surgisim.estimation.doubts import doubts, none, spreads
 from surgisim.estimation.finer import finely
 from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.identify import identifiability, in_words
@@ -85,6 +87,8 @@ class Estimate(NamedTuple):
     """How the instruments carry the tissue, as fitted."""
     body: Body
     """The body as it was laid for that."""
+    doubts: Doubts
+    """How tracked points would go were what is open beside the laws otherwise."""
 
 
 def estimate(
@@ -129,7 +133,7 @@ def estimate(
 
     reason = _nothing_to_learn(motion, tracks, body)
     if reason:
-        return Estimate(*_unfitted(make(body, motion), wanted, settings, camera, reason), motion, body)
+        return Estimate(*_unfitted(make(body, motion), wanted, settings, camera, reason), motion, body, none(tracks))
     bodies = [make(body, motion) for _ in range(WORKERS)]
     observation = observe(tracks, motion, camera, bodies[0].simulator, floor=FLOOR * body.spacing)
     total = len(frames.rgb)
@@ -167,18 +171,21 @@ def estimate(
         ends = windows(fitted, phase, settings.first_window)
         trial, solution = descend(trial, x, ends, settings, history, progress)
         model: dict[str, np.ndarray] = {}
+        open_beside: list[Otherwise] = []
         if trial.laying:
             ask = partial(otherwise, camera=camera, points=carried, make=make)
-            trial, solution, model = _weighed(trial, solution, ask, ends[-1:], settings, history, progress)
+            trial, solution, model, open_beside = _weighed(trial, solution, ask, ends[-1:], settings, history, progress)
         table = _known(trial, solution, model, phase, settings)
         wide, wide_x = trial, solution.x
         if trial.laying and any(q["told"] for q in table.values()):
             trial, solution = finely(trial, solution, history, _part(progress, 0.7, 0.8))
             shift = solution.x - wide_x
             table = _known(trial, solution, model | {"grid": np.outer(shift, shift)}, phase, settings)
+        unsure = doubts(wide, wide_x, spreads(wide.wanted, table), open_beside, tracks, camera)
         x = solution.x
     else:
         wide, wide_x = trial, x
+        unsure = none(tracks)
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
     support = Support(trial.depth(x), *edge, len(trial.motion.rim))
     coarse, uniform = wide.settled(wide_x), wide.values(wide_x)
@@ -225,9 +232,8 @@ def estimate(
     )
     names = np.array(columns(choose(prepared.terms)))
     material = Material(names, theta.astype(np.float32), trial.held)
-    return Estimate(
-        material, _physics(prepared, values, table, settings, path.step, trial.grip), fit, trial.motion, laid
-    )
+    physics = _physics(prepared, values, table, settings, path.step, trial.grip)
+    return Estimate(material, physics, fit, trial.motion, laid, unsure)
 
 
 def _opened(
@@ -277,10 +283,10 @@ def _weighed(
     settings: Estimation,
     history: list,
     progress: Say,
-) -> tuple[Trial, Solution, dict[str, np.ndarray]]:
+) -> tuple[Trial, Solution, dict[str, np.ndarray], list[Otherwise]]:
     """The fit held against its rivals, going on from a far more probable one, and against what it takes for granted.
 
-    With it the covariance that each adds to the numbers in search space, by its name.
+    With it the covariance that each adds to the numbers in search space, by its name, and what was taken for granted.
     """
     first, wanted = trial, trial.wanted
     found = answers(solution, list(rivals(trial, solution.x)), _part(progress, 0.55, 0.63), trial.regions)
@@ -302,7 +308,8 @@ def _weighed(
     for a, share in table:
         history.append({"round": "otherwise", "about": a.one.about, "share": share, "misfit": number(a.cost)})
     shifts = {a.one.about: (a.x - solution.x, share) for a, share in table}
-    return trial, solution, {about: share * np.outer(d, d) for about, (d, share) in shifts.items()}
+    taken = [one for one in ask_here[1:] if not one.rival]
+    return trial, solution, {about: share * np.outer(d, d) for about, (d, share) in shifts.items()}, taken
 
 
 def _known(trial: Trial, solution: Solution, model: dict, phase: np.ndarray, settings: Estimation) -> dict:

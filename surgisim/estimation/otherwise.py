@@ -72,6 +72,8 @@ class Otherwise:
     """Whether it competes with what was chosen by how well it fits."""
     begin: np.ndarray | None = None
     """Where the fit begins, if not from the one that is asked about, (M,)."""
+    view: View | None = None
+    """How tissue lies in it, if otherwise."""
     open: np.ndarray | None = None
     """Which numbers are fitted anew, (M,) bool; all if None."""
 
@@ -175,7 +177,7 @@ def _views(trial: Trial, x: np.ndarray, camera: Camera, points: np.ndarray, make
         view = View(camera, middle, **change)
         carried = points * view.factor(points)
         begin = np.clip(view.alike(x, trial.wanted), *trial.wanted.bounds)
-        yield Otherwise(about, seen_as(trial, view, partial(make, carried=carried)), begin=begin)
+        yield Otherwise(about, seen_as(trial, view, partial(make, carried=carried)), begin=begin, view=view)
 
 
 def seen_as(trial: Trial, view: View, make: Make) -> Trial:

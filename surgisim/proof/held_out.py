@@ -2,7 +2,7 @@
 
 All errors are RMS lengths over the visible points that the diagnosis used, in the frames held out, after each point's
 mean over the rest before the first grasp is taken off, because a point's reference offset is the tracker's and not the
-tissue's. In mm.
+tissue's. What lies along an axis of which the recording is less sure counts as much less. In mm.
 
     oracle        recorded minus the phantom's own noise-free path with the effects: law, numbers and solver all true
     oracle_before the same without the effects
@@ -51,8 +51,8 @@ def held_out(truth: Truth, recording: Recording, verdict: Verdict, mismatch: Mis
     held = recording.motion.active.any(0)
     parts = slice(0, int(held.argmax()) if held.any() else span[0]), slice(*span)
     points, used = recording.points.astype(float), _used(recording, mismatch)
-    floor = rms((points - truth.true)[used], *parts)
-    result = {"oracle": floor, "noise_floor": floor, "oracle_before": rms((points - truth.plain)[used], *parts)}
+    floor, before = (rms(recording.told_of(points - paths)[used], *parts) for paths in (truth.true, truth.plain))
+    result = {"oracle": floor, "noise_floor": floor, "oracle_before": before}
     told = verdict.held_out
     if mismatch is None:
         result |= {"before": told.get("before"), "after": told.get("after"), "source": "stated"}

@@ -84,7 +84,7 @@ def _at(paths: np.ndarray, corners: np.ndarray, weights: np.ndarray) -> np.ndarr
 def _ratio(recording: Recording, difference: np.ndarray, span: tuple[int, int]) -> float:
     """RMS length of differences [m], (K, T, 3), over the noise along each axis; visible samples in frames `span`."""
     frames = slice(*span)
-    over = (difference / recording.noise[:, None])[:, frames]
+    over = recording.over_noise(difference)[:, frames]
     seen = recording.visible[:, frames] & np.isfinite(over).all(-1)
     return float(np.sqrt((over[seen] ** 2).sum(-1).mean())) if seen.any() else 0.0
 

@@ -26,7 +26,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def facts(path: Path, expected: str) -> dict[str, Any]:
-    """recording.json: name, fps, frames, unit [m], density, gravity, tier, starts."""
+    """recording.json: name, fps, frames, unit [m], density, gravity, tier, starts, doubts."""
     body = read_json(path)
     needed = ("format", "name", "fps", "frames", "length_unit", "density_kg_m3", "gravity_m_s2", "tier")
     missing = [key for key in needed if key not in body]
@@ -54,8 +54,12 @@ def facts(path: Path, expected: str) -> dict[str, Any]:
     starts = body.get("starts", STARTS[0])
     if starts not in STARTS:
         raise Problem(f"{path}: 'starts' is {starts!r}, and {list(STARTS)} are known.")
+    doubts = body.get("doubts", [])
+    if not isinstance(doubts, list) or not all(isinstance(each, str) for each in doubts):
+        raise Problem(f"{path}: 'doubts' is {doubts!r}, but a list of names is wanted.")
     return {
         "name": name,
+        "doubts": doubts,
         "fps": float(fps),
         "frames": frames,
         "unit": UNITS[unit],

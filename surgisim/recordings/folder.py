@@ -7,7 +7,9 @@ fixed.json      {"boxes": [{"min": [x, y, z], "max": [x, y, z]}]}: regions of re
 grip.npz        center_rest (J, 3), radius (J,), position (J, T, 3), active (J, T): translating grips; optional rim
                 (E, T, 3) and rim_radius (E,): balls of tissue that go along all the time with what is beyond the body
 tracks.npz      points (K, T, 3), NaN where unseen; visible (K, T); sigma (K,); optional place (K, 3) on the rest body,
-                axes (K, 3): noise along x, y and z over sigma, RMS 1, where it is not alike
+                axes (K, 3): noise along x, y and z over sigma, RMS 1, where it is not alike; or along the rows of
+                ways (K, 3, 3), orthonormal; doubts (C, K, T, 3): where points would go instead, less where they are
+                taken to go, were one of C things otherwise by a standard deviation (recording.json: doubts, its names)
 split.json      {"fit": [0, t1], "held_out": [t1, T]}
 
 Keys that are not named here are passed over.
@@ -53,9 +55,9 @@ def read_recording(folder: Path) -> Recording:
         )
     tracks = arrays(
         _there(folder / "tracks.npz"),
-        {"points": "KT3", "visible": "KT", "sigma": "K", "place": "K3", "axes": "K3"},
+        {"points": "KT3", "visible": "KT", "sigma": "K", "place": "K3", "axes": "K3", "ways": "K33", "doubts": "CKT3"},
         frames,
-        ("place", "axes"),
+        ("place", "axes", "ways", "doubts"),
     )
     points, visible = tracks["points"] * unit, tracks["visible"].astype(bool)
     if not np.isfinite(points[visible]).all():
@@ -74,6 +76,17 @@ def read_recording(folder: Path) -> Recording:
         raise Problem(
             f"{folder / 'tracks.npz'}: axes must be finite and positive. Give how noise is shared by x, y, z."
         )
+    ways = tracks["ways"].astype(float) if "ways" in tracks else None
+    if ways is not None:
+        if axes is None:
+            raise Problem(f"{folder / 'tracks.npz'}: ways has the directions of axes, which are missing. Give both.")
+        off = np.abs(ways @ np.swapaxes(ways, 1, 2) - np.eye(3)).max((1, 2))
+        askew = np.flatnonzero(~(off < 1e-3))
+        if len(askew):
+            raise Problem(
+                f"{folder / 'tracks.npz'}: the ways of point {askew[0]} are not of length 1 or not at right angles. "
+                "Give the rows of a rotation."
+            )
     return Recording(
         name=told["name"],
         fps=told["fps"],
@@ -89,6 +102,8 @@ def read_recording(folder: Path) -> Recording:
         starts=told["starts"],
         place=tracks["place"].astype(float) * unit if "place" in tracks else None,
         axes=None if axes is None else axes / np.sqrt((axes**2).mean(1, keepdims=True)),
+        ways=ways,
+        doubts=_doubts(folder, told["doubts"], tracks.get("doubts"), unit),
         split=split_of(folder / "split.json", frames) if (folder / "split.json").is_file() else None,
     )
 
@@ -118,6 +133,11 @@ def encoded_recording(recording: Recording) -> dict[str, bytes]:
         tracks["place"] = recording.place
     if recording.axes is not None:
         tracks["axes"] = recording.axes
+    if recording.ways is not None:
+        tracks["ways"] = recording.ways
+    if recording.doubts:
+        told["doubts"] = list(recording.doubts)
+        tracks["doubts"] = np.stack(list(recording.doubts.values())).astype(np.float32)
     grips = {"center_rest": motion.center_rest, "radius": motion.radius}
     grips |= {"position": motion.position, "active": motion.active}
     if len(motion.rim):
@@ -132,6 +152,18 @@ def encoded_recording(recording: Recording) -> dict[str, bytes]:
     if recording.split is not None:
         files["split.json"] = _json({name: list(span) for name, span in recording.split.items()})
     return files
+
+
+def _doubts(folder: Path, names: list[str], moved: np.ndarray | None, unit: float) -> dict[str, np.ndarray]:
+    count = 0 if moved is None else len(moved)
+    if len(names) != count or len(set(names)) != count:
+        raise Problem(
+            f"{folder / NAME}: 'doubts' has {len(names)} names, and tracks.npz has doubts of {count} things. Give each "
+            "one name of its own."
+        )
+    if moved is not None and not np.isfinite(moved).all():
+        raise Problem(f"{folder / 'tracks.npz'}: doubts must be finite. Give zero where a point does not move by it.")
+    return dict(zip(names, moved * unit, strict=True)) if count else {}
 
 
 def _motion(path: Path, frames: int, unit: float) -> Motion:

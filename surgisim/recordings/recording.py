@@ -1,6 +1,6 @@
 """Tracked points of a body whose shape, holders and grips are known."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -10,6 +10,7 @@ from surgisim.artifacts.body import Body
 from surgisim.artifacts.motion import Motion
 from surgisim.recordings.fill import fill
 from surgisim.recordings.mesh import Mesh
+from surgisim.recordings.ways import told_of, turned
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +42,12 @@ class Recording:
     place: np.ndarray | None = None
     """Where each point sits on the body at rest [m], (K, 3), if not where it is first seen."""
     axes: np.ndarray | None = None
-    """Each point's noise along each axis of the frame over `sigma` [1], (K, 3), of RMS 1, if not alike."""
+    """Each point's noise along each axis over `sigma` [1], (K, 3), of RMS 1, if not alike."""
+    ways: np.ndarray | None = None
+    """Directions of those axes, orthonormal rows for each point, (K, 3, 3), if not those of the frame."""
+    doubts: dict[str, np.ndarray] = field(default_factory=dict)
+    """How much farther each point would go were something otherwise by one standard deviation that body and grips were
+    taken to be [m], (K, T, 3), by its name."""
     split: dict[str, tuple[int, int]] | None = None
     """Frames `fit` and `held_out`, first and one past the last."""
 
@@ -53,6 +59,8 @@ class Recording:
             f"recording {self.name}: shapes {shapes} do not fit; (K, T, 3), (K, T), (K,), (B, 2, 3) are wanted.",
         )
         check(t > 0 and k > 0, f"recording {self.name}: {k} points in {t} frames; at least one of each is wanted.")
+        for name, moved in self.doubts.items():
+            check(moved.shape == (k, t, 3), f"recording {self.name}: doubt '{name}' is {moved.shape}, not (K, T, 3).")
         grips = self.motion.active.shape[-1]
         check(grips == t, f"recording {self.name}: the grips have {grips} frames, the points {t}.")
         check(
@@ -63,6 +71,10 @@ class Recording:
             self.axes is None or self.axes.shape == (k, 3),
             f"recording {self.name}: 'axes' must give three shares of the noise for each of the {k} points.",
         )
+        check(
+            self.ways is None or (self.ways.shape == (k, 3, 3) and self.axes is not None),
+            f"recording {self.name}: 'ways' must give the directions of 'axes' for each of the {k} points.",
+        )
 
     @property
     def frames(self) -> int:
@@ -70,14 +82,22 @@ class Recording:
 
     @property
     def noise(self) -> np.ndarray:
-        """Nominal noise of each point along each axis [m], (K, 3)."""
+        """Nominal noise of each point along each of its axes [m], (K, 3)."""
         return self.sigma[:, None] * (np.ones((1, 3)) if self.axes is None else self.axes)
+
+    def over_noise(self, field: np.ndarray) -> np.ndarray:
+        """Displacements [m], (K, T, 3), along each point's axes over its noise there [1]."""
+        return turned(field, self.ways) / self.noise[:, None]
+
+    def told_of(self, field: np.ndarray) -> np.ndarray:
+        """What the recording can tell of displacements [m], (K, T, 3)."""
+        return told_of(field, self.axes, self.ways)
 
     def of(self, kept: np.ndarray | slice) -> "Recording":
         """Some of the points alone, as an index, (M,), or a slice chooses them."""
-        names = ("points", "visible", "sigma", "place", "axes")
+        names = ("points", "visible", "sigma", "place", "axes", "ways")
         chosen = {name: value[kept] for name in names if (value := getattr(self, name)) is not None}
-        return replace(self, **chosen)
+        return replace(self, **chosen, doubts={name: moved[kept] for name, moved in self.doubts.items()})
 
     @property
     def fitted_until(self) -> int:

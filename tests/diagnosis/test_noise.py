@@ -49,6 +49,38 @@ def test_depth_that_is_less_sure_weighs_less(drawn):
     assert whiten(other) @ whiten(field) == pytest.approx((other * whiten.back(whiten(field))).sum())
 
 
+def ways(count):
+    """A third direction that leans another way for each point, and two across it."""
+    along = np.stack([np.linspace(-0.4, 0.4, count), np.linspace(0.3, -0.2, count), np.ones(count)], 1)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    right = np.cross([0.0, 1.0, 0.0], along)
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    return np.stack([right, np.cross(along, right), along], 1)
+
+
+def test_what_is_less_sure_along_a_points_own_way_weighs_less_there(drawn):
+    rest, noise, *_ = drawn
+    turned = replace(noise, axes=np.tile(AXES, (50, 1)), ways=ways(50))
+    field = turned.draw(rest, FRAMES, np.random.default_rng(7))
+    seen = np.ones((50, FRAMES), bool)
+    whiten = whitener(turned, rest, seen)
+    white = whiten(field).reshape(50, FRAMES, 3)
+    assert (white**2).mean((0, 1)) == pytest.approx([1, 1, 1], abs=0.1)
+    other = np.random.default_rng(9).standard_normal(field.shape)
+    assert whiten(other) @ whiten(field) == pytest.approx((other * whiten.back(whiten(field))).sum())
+    along, across = (np.linspace(0, 1e-3, FRAMES)[:, None] * turned.ways[:, None, a] for a in (2, 0))
+    assert (whiten(along) ** 2).sum() == pytest.approx(0.15 / 2.7 * (whiten(across) ** 2).sum())
+    # The same with axes along the frame lets what is not known of one axis hide what is known of the others.
+    level = np.einsum("kai,ka->ki", turned.ways**2, turned.axes**2)
+    straight = whitener(replace(turned, axes=np.sqrt(level), ways=None), rest, seen)
+    assert (straight(across) ** 2).sum() < 0.8 * (whiten(across) ** 2).sum()
+    assert turned.told_of(across) == pytest.approx(across)
+    assert turned.told_of(along) == pytest.approx(np.sqrt(0.15 / 2.7) * along)
+    found = estimate(field, seen, rest, np.ones(FRAMES, bool), np.full(50, 2e-5), turned.axes, turned.ways)
+    assert found.sigma == pytest.approx(noise.sigma, rel=0.15)
+    assert found.ways is turned.ways
+
+
 @pytest.mark.parametrize("axes", [None, np.tile(AXES, (50, 1))])
 def test_it_is_told_in_plain_numbers_whether_axes_are_alike_or_not(drawn, axes):
     _, noise, *_ = drawn
@@ -65,7 +97,12 @@ def test_errors_that_still_frames_do_not_show_are_at_least_as_large_as_said(draw
     quiet, loud = (estimate(*told, np.full(20, sigma), axes) for sigma in (2e-5, 3e-3))
     assert quiet.sigma == pytest.approx(noise.sigma, rel=0.3)
     assert loud.sigma == pytest.approx(3e-3)
-    assert (loud.keep_shared, loud.length) >= (0.95, 0.012)
+    assert loud.keep_shared >= 0.97
+    assert loud.length <= 0.002
+    apart = estimate(*told, np.linspace(1e-3, 5e-3, 20), axes)
+    assert apart.level == pytest.approx(np.linspace(1e-3, 5e-3, 20))
+    assert apart.sigma == pytest.approx(np.sqrt((apart.level**2).mean()))
+    assert apart.plain == pytest.approx(np.sqrt(0.15) * apart.sigma)
     # A smooth change as large as that is nothing then; without axes, frames at rest have the word.
     bent = 3e-3 * np.exp(-(((rest[:, :1] - 0.02) / 0.015) ** 2))[..., None] * np.linspace(0, 1, FRAMES)[:, None] * AXES
     beyond = [(whitener(n, rest, seen)(bent) ** 2).sum() for n in (loud, quiet)]

@@ -252,3 +252,19 @@ def test_laws_owe_what_the_base_loses_where_the_camera_may_drift_less(case):
 def test_the_log_determinant_of_a_metric_is_that_of_its_covariance():
     U = np.random.default_rng(0).normal(size=(7, 3))
     assert metric(U).log_det == pytest.approx(np.linalg.slogdet(np.eye(7) + U @ U.T)[1], rel=1e-5)
+
+
+def test_what_perception_left_open_is_no_misfit(case):
+    clip, until = case.clip, case.clip.until
+    course = np.clip((np.arange(clip.frames) - 4) / 5, 0, 1)[None, :, None]
+    away = np.linalg.norm(clip.recording.place - clip.motion.center_rest[0], axis=1)
+    deeper = 2e-3 * np.exp(-0.5 * (away / 0.01) ** 2)[:, None, None] * course * [0.6, 0.0, 0.8]
+    told = replace(clip, recording=replace(clip.recording, doubts={"held.depth": deeper}))
+    group = nuisance.perceived(told)
+    assert group.values == (("held.depth", 1.0, "standard deviations"),)
+    assert not len(nuisance.perceived(clip).columns)
+    white = case.whiten(deeper[clip.kept][:, :until])[:, None]
+    found = {}
+    for name, groups in (("told", [*case.groups, group]), ("not", case.groups)):
+        found[name] = metric(whitened(case.whiten, groups, until)).gram(white, white)[0, 0]
+    assert found["told"] < 1.1 < 100 < found["not"]

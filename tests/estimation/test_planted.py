@@ -90,7 +90,7 @@ def test_a_stiff_half_is_found_by_the_refinement():
         return np.where(rest[:, 0] > 0, 2.0, 0.7)
 
     settings = Estimation(**{**QUICK, "field_iterations": 15, "smoothness": 0.3, "field": ["corotated.E"]})
-    material, _, fit, _, laid = estimate(*clip(stiff=stiff, noise=1e-5), settings, silent)
+    material, _, fit, _, laid, _ = estimate(*clip(stiff=stiff, noise=1e-5), settings, silent)
     right = laid.rest[:, 0] > 0
     E = material.values[:, 0]
     assert fit.held_out["field_kept"]
@@ -135,11 +135,16 @@ def test_rounds_double_so_that_their_sum_stays_below_twice_the_clip():
 
 
 def test_how_deep_the_body_is_held_is_found_from_the_spread_of_the_pull():
-    _, _, fit, _, laid = estimate(*clip(deep=0.009), Estimation(**QUICK), silent)
+    _, _, fit, _, laid, doubts = estimate(*clip(deep=0.009), Estimation(**QUICK), silent)
     depth = fit.identifiability["held.depth"]
     assert depth["value"] == pytest.approx(0.009, abs=0.002)
     assert fit.held_out["support"]["depth"] == depth["value"]
     assert laid.rest[~laid.held, 2].max() < 0.06 + depth["value"]
+    # Held a standard deviation deeper, tissue that is pulled goes elsewhere, and only then.
+    deeper = doubts.moved[list(doubts.names).index("held.depth")]
+    assert np.abs(deeper[:, 0]).max() < 1e-6
+    assert np.abs(deeper[:, 8]).max() > 1e-5
+    assert not {"corotated.E", "grip 0.release"} & set(doubts.names)
 
 
 def test_how_far_the_grip_comes_nearer_is_found_where_depth_is_not_measured():
@@ -149,7 +154,7 @@ def test_how_far_the_grip_comes_nearer_is_found_where_depth_is_not_measured():
     seen = CAMERA.lift(CAMERA.project(motion.position), flat)
     case[2] = replace(tracks, sigma_xyz=tracks.sigma_xyz + np.array([0.0, 0.01], np.float32))
     case[3] = replace(motion, position=seen)
-    _, _, fit, carried, _ = estimate(*case, Estimation(**QUICK), silent)
+    _, _, fit, carried, *_ = estimate(*case, Estimation(**QUICK), silent)
     nearer = fit.identifiability["grip 0.toward"]
     assert nearer["low"] < -0.006 < nearer["high"]
     assert nearer["value"] == pytest.approx(-0.006, rel=0.2)

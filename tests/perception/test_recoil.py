@@ -22,6 +22,10 @@ def following(jaws: np.ndarray) -> Following:
     return Following(none, none, motion, none, motion)
 
 
+UNSEEN = np.full((T, 2), np.nan)
+"""Where an instrument ends of which that is not seen."""
+
+
 def standing(way: np.ndarray) -> np.ndarray:
     """Jaws that carry the tissue out and stay there."""
     return way[np.minimum(np.arange(T), LET_GO)]
@@ -30,21 +34,28 @@ def standing(way: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("back_in", [2, 4])
 def test_what_springs_back_while_the_jaws_stand_was_let_go_before(back_in):
     way = carried(back_in)
-    assert recoiled(way, following(standing(way)), 5, THOUGHT) == LET_GO
+    assert recoiled(way, following(standing(way)), UNSEEN, 5, THOUGHT) == LET_GO
+
+
+def test_tissue_that_rushes_by_does_not_drag_an_outline_along():
+    way = carried(2)
+    dragged = following(standing(way) + 0.65 * (way - standing(way)))
+    assert recoiled(way, dragged, UNSEEN, 5, THOUGHT) == THOUGHT
+    assert recoiled(way, dragged, 80.0 + standing(way), 5, THOUGHT) == LET_GO
 
 
 def test_what_the_jaws_carry_back_is_still_held():
     way = carried(4)
-    assert recoiled(way, following(way), 5, THOUGHT) == THOUGHT
+    assert recoiled(way, following(way), 80.0 + way, 5, THOUGHT) == THOUGHT
 
 
 def test_what_creeps_back_does_not_say_that_it_is_free():
     way = carried(18)
-    assert recoiled(way, following(standing(way)), 5, THOUGHT) == THOUGHT
+    assert recoiled(way, following(standing(way)), UNSEEN, 5, THOUGHT) == THOUGHT
 
 
 def test_jaws_that_are_not_seen_do_not_say_that_tissue_goes_back_alone():
     way = carried(4)
     unseen = following(standing(way))
     unseen.jaws[LET_GO:] = np.nan
-    assert recoiled(way, unseen, 5, THOUGHT) == THOUGHT
+    assert recoiled(way, unseen, UNSEEN, 5, THOUGHT) == THOUGHT

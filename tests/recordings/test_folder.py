@@ -153,6 +153,8 @@ JSON = [
     ({"gravity_m_s2": [0, 9.81]}, r"'gravity_m_s2' is \[0, 9.81\]"),
     ({"tier": None}, "'tier' is None"),
     ({"starts": "falling"}, "'starts' is 'falling'"),
+    ({"doubts": "depth"}, "'doubts' is 'depth', but a list of names is wanted"),
+    ({"doubts": ["depth"]}, "'doubts' has 1 names, and tracks.npz has doubts of 0 things"),
 ]
 
 
@@ -170,6 +172,10 @@ ARRAYS = [
     ("tracks.npz", {"visible": np.zeros((4, 6), bool)}, "point 0 is never visible"),
     ("tracks.npz", {"points": np.full((4, 6, 3), "a")}, "'points' holds <U1"),
     ("tracks.npz", {"place": np.zeros((3, 3))}, r"'place' is \(3, 3\)"),
+    ("tracks.npz", {"ways": np.tile(np.eye(3), (4, 1, 1))}, "directions of axes, which are missing"),
+    ("tracks.npz", {"axes": np.ones((4, 3)), "ways": np.ones((4, 3, 3))}, "ways of point 0 are not of length 1"),
+    ("tracks.npz", {"doubts": np.zeros((1, 4, 5, 3))}, r"'doubts' is \(1, 4, 5, 3\)"),
+    ("tracks.npz", {"doubts": np.zeros((1, 4, 6, 3))}, "has doubts of 1 things"),
     ("grip.npz", {"radius": np.zeros(1)}, "radius 0 is not positive"),
     ("grip.npz", {"position": np.full((1, 6, 3), np.nan)}, "a grip that holds has a position that is not a number"),
     ("grip.npz", {"active": np.ones((1, 5), bool)}, r"'active' is \(1, 5\), but \(J, T\) is wanted"),

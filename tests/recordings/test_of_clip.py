@@ -7,6 +7,7 @@ import pytest
 from slab import pulled, slab
 
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.doubts import Doubts
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.material import Material
 from surgisim.artifacts.physics import Physics
@@ -37,7 +38,10 @@ def clip(seen=True):
     split[-5:] = 2
     camera = Camera(64, 48, 80.0, 80.0, 31.5, 23.5, 25.0, T, "known", "given", "slab", [64, 48], [0, 0, 64, 48])
     frames = Frames(np.zeros((T, 48, 64, 3), np.uint8), split)
-    return body, material, physics, tracks, motion, frames, camera
+    moved = np.zeros((1, k, T, 3), np.float32)
+    moved[0, :, 8:, 0] = 1e-4
+    doubts = Doubts(np.array(["held.depth"]), moved)
+    return body, material, physics, tracks, motion, frames, camera, doubts
 
 
 def test_a_clip_survives_the_way_through_a_folder(tmp_path):
@@ -45,6 +49,7 @@ def test_a_clip_survives_the_way_through_a_folder(tmp_path):
     write_recording(recording_of("slab", body, *rest), tmp_path)
     back = read_recording(tmp_path)
     assert back.split == {"fit": (0, T - 5), "held_out": (T - 5, T)}
+    assert back.doubts["held.depth"][:, 9] == pytest.approx(np.tile([1e-4, 0, 0], (len(back.points), 1)))
     assert not back.visible[3, 5:9].any()
     assert back.mesh.volume == pytest.approx(float(body.volume.sum()), rel=0.12)
     filled = back.body(body.spacing)
@@ -56,11 +61,25 @@ def test_noise_across_and_along_the_view_survives_too(tmp_path):
     sigma = np.broadcast_to(np.float32([1e-4, 5e-4]), tracks.sigma_xyz.shape)
     found = recording_of("slab", body, material, physics, dataclasses.replace(tracks, sigma_xyz=sigma), *rest)
     ray = found.place / np.linalg.norm(found.place, axis=1, keepdims=True)
-    assert found.noise**2 == pytest.approx(1e-8 + 24e-8 * ray**2, rel=1e-4)
+    covariance = np.einsum("kai,ka,kaj->kij", found.ways, found.noise**2, found.ways)
+    wanted = 1e-8 * np.eye(3) + 24e-8 * ray[:, :, None] * ray[:, None]
+    assert covariance == pytest.approx(wanted, abs=1e-12)
     assert found.sigma == pytest.approx(np.sqrt(9e-8), rel=1e-4)
     write_recording(found, tmp_path)
-    assert read_recording(tmp_path).noise == pytest.approx(found.noise)
-    assert found.of(np.arange(3)).axes.shape == (3, 3)
+    back = read_recording(tmp_path)
+    assert back.noise == pytest.approx(found.noise)
+    assert back.ways == pytest.approx(found.ways)
+    assert found.of(np.arange(3)).ways.shape == (3, 3, 3)
+
+
+def test_a_point_that_has_gone_far_is_less_sure():
+    body, material, physics, tracks, *rest = clip()
+    xyz = tracks.xyz.copy()
+    xyz[0, :, 0] += 0.02
+    xyz[0, 0, 0] -= 0.02
+    found = recording_of("slab", body, material, physics, dataclasses.replace(tracks, xyz=xyz), *rest)
+    assert found.noise[1, 0] == pytest.approx(2e-4, rel=1e-3)
+    assert found.noise[0, 0] == pytest.approx(np.hypot(2e-4, 0.04 * 0.02 * np.sqrt((T - 1) / T)), rel=1e-2)
 
 
 def test_the_surface_encloses_the_body():

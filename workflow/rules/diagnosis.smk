@@ -13,6 +13,7 @@ rule recorded:
         motion=upstream("estimation", "motion.npz"),
         frames=upstream("ingest", "frames.npz"),
         camera=upstream("ingest", "camera.json"),
+        doubts=upstream("estimation", "doubts.npz"),
     output:
         recording="results/{clip}/{variant}/diagnosis/recording/recording.json",
         rest="results/{clip}/{variant}/diagnosis/recording/rest.ply",
@@ -34,7 +35,7 @@ rule recorded:
     shell:
         'python "$SURGISIM/stages/recorded.py"'
         " --body {input.body} --material {input.material} --physics {input.physics} --tracks {input.tracks}"
-        " --motion {input.motion} --frames {input.frames} --camera {input.camera}"
+        " --motion {input.motion} --frames {input.frames} --camera {input.camera} --doubts {input.doubts}"
         " --recording {output.recording} --rest {output.rest} --fixed {output.fixed} --grip {output.grip}"
         " --points {output.points} --split {output.split}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"

@@ -16,6 +16,7 @@ rule estimation:
         fit="results/{clip}/{variant}/estimation/fit.json",
         carried="results/{clip}/{variant}/estimation/motion.npz",
         laid="results/{clip}/{variant}/estimation/body.npz",
+        doubts="results/{clip}/{variant}/estimation/doubts.npz",
     log:
         "logs/{clip}/{variant}/estimation.log",
     benchmark:
@@ -34,7 +35,7 @@ rule estimation:
         " --body {input.body} --scene {input.scene} --tracks {input.tracks} --motion {input.motion}"
         " --frames {input.frames} --masks {input.masks} --camera {input.camera}"
         " --material {output.material} --physics {output.physics} --fit {output.fit}"
-        " --carried {output.carried} --laid {output.laid}"
+        " --carried {output.carried} --laid {output.laid} --doubts {output.doubts}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 

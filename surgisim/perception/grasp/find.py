@@ -88,7 +88,7 @@ def _grip(
     near = np.argsort(np.linalg.norm(start - center, axis=-1))[:9]
     course = np.median(xy[near] - start[near][:, None], axis=0)
     begin = began(follows, first, side)
-    end = recoiled(course, follows, begin, let_go(follows, last, frames))
+    end = recoiled(course, follows, tool.tip, begin, let_go(follows, last, frames))
     if end - begin < 3:
         return None
     far = np.linalg.norm(course - course[begin], axis=-1)[begin : end + 1]

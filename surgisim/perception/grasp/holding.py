@@ -77,11 +77,13 @@ def let_go(follows: Following, last: int, frames: int) -> int:
     return near.start + int(np.argmax(sudden > 0.5 * sudden.max()))
 
 
-def recoiled(course: np.ndarray, follows: Following, begin: int, end: int) -> int:
+def recoiled(course: np.ndarray, follows: Following, tip: np.ndarray, begin: int, end: int) -> int:
     """The last frame before tissue springs back without the jaws; `end` where it does not.
 
-    course: where the tissue at the jaws is carried [px], (T, 2), held from `begin` to `end` as far as is known. Jaws
-    open slowly, and stand or draw back near the place where tissue has left them: that it goes back alone says when.
+    course: where the tissue at the jaws is carried [px], (T, 2), held from `begin` to `end` as far as is known. tip:
+    where the instrument ends [px], NaN where it is not seen, (T, 2). Jaws open slowly, and stand or draw back near the
+    place where tissue has left them: that it goes back alone says when. Tissue that rushes by drags the flow of the jaws
+    along, an outline it does not; so either may say it.
     """
     way = course - course[begin]
     top = begin + int(np.linalg.norm(way[begin : end + 1], axis=-1).argmax())
@@ -89,8 +91,9 @@ def recoiled(course: np.ndarray, follows: Following, begin: int, end: int) -> in
     last = begin + int(np.flatnonzero(share[begin : end + 1] >= AWAY)[-1])
     after = min(last + QUICK, len(course) - 1)
     back, jaws = course[after] - course[last], follows.jaws[last:after]
-    if not np.isfinite(jaws).all(-1).any():
-        return end
-    # In a frame in which the jaws are not seen they go as in the others.
-    alone = np.linalg.norm(back - (after - last) * np.nanmean(jaws, axis=0)) > PARTLY * np.linalg.norm(back)
+    ways = [tip[after] - tip[last]]
+    if np.isfinite(jaws).all(-1).any():
+        # In a frame in which the jaws are not seen they go as in the others.
+        ways.append((after - last) * np.nanmean(jaws, axis=0))
+    alone = any(np.linalg.norm(back - way) > PARTLY * np.linalg.norm(back) for way in ways if np.isfinite(way).all())
     return last if alone and share[last] - share[after] > FALL else end

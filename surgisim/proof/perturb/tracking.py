@@ -8,6 +8,7 @@ import numpy as np
 from surgisim.phantom import nuisance
 from surgisim.problem import Problem
 from surgisim.recordings.recording import Recording
+from surgisim.recordings.ways import turned
 
 
 def noisier(recording: Recording, rng: np.random.Generator, true: np.ndarray | None, factor: float) -> Recording:
@@ -19,7 +20,8 @@ def noisier(recording: Recording, rng: np.random.Generator, true: np.ndarray | N
         points = true + factor * (recording.points - true)
     else:
         added = math.sqrt(factor**2 - 1) * recording.noise[:, None]
-        points = recording.points + added * rng.standard_normal(recording.points.shape)
+        added = added * rng.standard_normal(recording.points.shape)
+        points = recording.points + turned(added, recording.ways, back=True)
     return dataclasses.replace(recording, points=points.astype(np.float32), sigma=factor * recording.sigma)
 
 

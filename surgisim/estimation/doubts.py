@@ -1,0 +1,89 @@
+"""How the simulated tissue would move were what a fit leaves open otherwise by one standard deviation.
+
+What diagnoses a clip must not take a wrong lens, a body held too deep or a grip that comes nearer than was found for
+physics that was left out. Its own base has the laws' numbers and the moment of release; the rest is told here.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.doubts import Doubts
+from surgisim.artifacts.tracks import Tracks
+from surgisim.estimation.otherwise import Otherwise
+from surgisim.estimation.search import Search
+from surgisim.estimation.trial import Trial, at_once
+from surgisim.estimation.view import View
+from surgisim.mpm.simulator import Breakdown
+
+NINETY = 1.645
+"""Standard deviations from the middle to either end of a 90 % interval."""
+ON_BODY = 0.05
+"""How far from 1 the weights of a point on the body may sum."""
+
+
+def doubts(
+    trial: Trial, x: np.ndarray, spread: Mapping[str, float], others: list[Otherwise], tracks: Tracks, camera: Camera
+) -> Doubts:
+    """Of a fit with a body laid for it that ended at x, (M,), for every tracked point; zero where it is off the body.
+
+    spread: standard deviation of what is open beside the laws, by its name, in search space. others: what the fit takes
+    for granted, changed by one standard deviation each.
+    """
+    low, high = trial.wanted.bounds
+    jobs: list[tuple[str, Trial, np.ndarray, View | None]] = [("", trial, x, None)]
+    for k, name in enumerate(trial.wanted.names):
+        if name in spread and not name.endswith(".release"):
+            step = spread[name] * np.eye(len(x))[k]
+            # At the end of its range nothing would change on one side.
+            side = 1.0 if x[k] < 0.5 * (low[k] + high[k]) else -1.0
+            jobs.append((name, trial, np.clip(x + side * step, low, high), None))
+    jobs += [(one.about, one.trial, x if one.begin is None else one.begin, one.view) for one in others]
+
+    def of(job: tuple, worker: int) -> np.ndarray | None:
+        _, there, at, view = job
+        try:
+            return seen(there, at, tracks, camera, view, worker)
+        except Breakdown:
+            return None
+
+    here, *there = at_once(of, jobs)
+    kept = [(name, way - here) for (name, *_), way in zip(jobs[1:], there, strict=True) if way is not None]
+    moved = np.stack([way for _, way in kept]) if kept else np.zeros((0, *here.shape))
+    return Doubts(np.array([name for name, _ in kept], dtype=str), moved.astype(np.float32))
+
+
+def none(tracks: Tracks) -> Doubts:
+    """No doubts, where nothing was fitted."""
+    return Doubts(np.array([], dtype=str), np.zeros((0, *tracks.xyz.shape), np.float32))
+
+
+def spreads(wanted: Search, table: Mapping[str, dict]) -> dict[str, float]:
+    """Standard deviation in search space of what is open beside the laws, from the intervals of a table."""
+    found = {}
+    for u in wanted.open:
+        low, high = (table[u.name][end] for end in ("low", "high"))
+        found[u.name] = float(np.log(high / low) if u.logarithmic else (high - low) / u.size) / (2 * NINETY)
+    return found
+
+
+def seen(
+    trial: Trial, x: np.ndarray, tracks: Tracks, camera: Camera, view: View | None = None, worker: int = 0
+) -> np.ndarray:
+    """Where every tracked point goes at x, across the view at its depth of frame 0 and along it [m], (K, T, 3).
+
+    view: how the trial's tissue lies, if otherwise than the tracks say.
+    """
+    rest = tracks.xyz[:, 0].astype(float)
+    known = np.isfinite(rest).all(1)
+    rest = np.where(known[:, None], rest, np.nanmean(rest, 0))
+    lies, through = (rest * view.factor(rest), view.seen_by) if view else (rest, camera)
+    run = trial.run(x, worker)
+    simulator = trial.stand(x, worker)[0].bodies[worker].simulator
+    carry = simulator.carry(lies)
+    known &= abs(simulator.support(carry) - 1) < ON_BODY
+    moved = np.stack([carry @ u.astype(float) for u in run.u], 1)
+    pixels = through.project(lies[:, None] + moved)
+    across = (pixels - pixels[:, :1]) * rest[:, None, 2:] / [camera.fx, camera.fy]
+    return np.where(known[:, None, None], np.concatenate([across, moved[..., 2:]], -1), 0.0)
