@@ -82,8 +82,8 @@ def recoiled(course: np.ndarray, follows: Following, tip: np.ndarray, begin: int
 
     course: where the tissue at the jaws is carried [px], (T, 2), held from `begin` to `end` as far as is known. tip:
     where the instrument ends [px], NaN where it is not seen, (T, 2). Jaws open slowly, and stand or draw back near the
-    place where tissue has left them: that it goes back alone says when. Tissue that rushes by drags the flow of the jaws
-    along, an outline it does not; so either may say it.
+    place where tissue has left them: that it goes back alone says when. Tissue that rushes by drags the flow of the
+    jaws along, an outline it does not; so either may say it.
     """
     way = course - course[begin]
     top = begin + int(np.linalg.norm(way[begin : end + 1], axis=-1).argmax())
