@@ -10,6 +10,8 @@ from surgisim.mpm.simulator import Breakdown
 
 RENEWED = 0.05
 """Share of the cost a step must win, or the derivative is taken anew."""
+SMALLER = (4.0, 16.0)
+"""How many times smaller steps are where a body that hardly bears what pulls it breaks down beside where it is."""
 WIDTH = 2.0
 """Standard deviations beyond which a residual counts linearly: a lost track must not bend a modulus."""
 
@@ -118,16 +120,21 @@ def derivative(
 ) -> np.ndarray:
     """Derivative of the residuals r, (R,), at x, (M,), by differences of these sizes, (R, M).
 
-    A difference of 0 stands for a number that makes none. together(xs): the residuals of several x. Raises Breakdown
-    where neither side of a number can be simulated.
+    A difference of 0 stands for a number that makes none. together(xs): the residuals of several x. Where neither side
+    of a number can be simulated, smaller steps are tried (SMALLER); raises Breakdown where none of them can.
     """
     low, high = bounds
     side = np.where(x + differences <= high, 1.0, -1.0) * differences
     asked = np.flatnonzero(side)
     shifted = dict(zip(asked, together(list(x + np.diag(side)[asked])), strict=True))
     for m in [m for m, s in shifted.items() if s is None]:
-        side[m] = -side[m]
-        (shifted[m],) = together([np.clip(x + side[m] * np.eye(len(x))[m], low, high)])
+        whole = side[m]
+        for part in (-1.0, *(sign / times for times in SMALLER for sign in (1.0, -1.0))):
+            at = np.clip(x + part * whole * np.eye(len(x))[m], low, high)
+            side[m] = at[m] - x[m]
+            (shifted[m],) = together([at]) if side[m] else (None,)
+            if shifted[m] is not None:
+                break
     if any(s is None for s in shifted.values()):
         raise Breakdown(
             "estimation: the simulation breaks down a small step beside the current parameters. "

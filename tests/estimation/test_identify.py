@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from surgisim.estimation.gauss_newton import Solution
+from surgisim.estimation.gauss_newton import Solution, derivative
 from surgisim.estimation.identify import identifiability, in_words, regional
 from surgisim.estimation.search import search
 from surgisim.estimation.support import Support
+from surgisim.mpm.simulator import Breakdown
 
 
 def told(model=None, phase="release", wider=1.0):
@@ -78,3 +79,16 @@ def test_no_viscosity_is_told_by_tissue_that_is_driven_all_the_time():
         assert free[name]["told"]
         assert not driven[name]["told"]
     assert driven["corotated.nu"]["told"]
+
+
+def test_a_derivative_where_only_small_steps_can_be_simulated():
+    """A body that hardly bears its pull breaks down on either side of where it is, but not a small step beside."""
+
+    def together(xs):
+        return [None if abs(x[1]) > 0.01 else np.array([3.0 * x[0], 2.0 * x[1], x[0] * x[1]]) for x in xs]
+
+    x, ends = np.array([1.0, 0.0]), (np.full(2, -9.0), np.full(2, 9.0))
+    J = derivative(together, x, together([x])[0], np.array([0.1, 0.12]), ends)
+    assert pytest.approx(np.array([[3.0, 0.0], [0.0, 2.0], [0.0, 1.0]])) == J
+    with pytest.raises(Breakdown, match="a small step beside"):
+        derivative(together, x, together([x])[0], np.array([0.1, 0.5]), ends)
