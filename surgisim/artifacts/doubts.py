@@ -14,8 +14,8 @@ class Doubts(Artifact):
     names: np.ndarray
     """(C,) str."""
     moved: np.ndarray
-    """By how much a point then goes elsewhere, to the right and down across the view at its depth of frame 0, and along
-    the view [m], (C, K, T, 3) float32."""
+    """By how much a point then goes elsewhere, as its pixel shows it at its depth of frame 0, camera frame [m],
+    (C, K, T, 3) float32."""
 
     UNITS = {"moved": "m"}
 

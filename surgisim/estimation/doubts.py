@@ -71,7 +71,7 @@ def spreads(wanted: Search, table: Mapping[str, dict]) -> dict[str, float]:
 def seen(
     trial: Trial, x: np.ndarray, tracks: Tracks, camera: Camera, view: View | None = None, worker: int = 0
 ) -> np.ndarray:
-    """Where every tracked point goes at x, across the view at its depth of frame 0 and along it [m], (K, T, 3).
+    """How far every tracked point goes at x, as its pixel shows it at its depth of frame 0, camera frame [m], (K, T, 3).
 
     view: how the trial's tissue lies, if otherwise than the tracks say.
     """
@@ -86,4 +86,6 @@ def seen(
     moved = np.stack([carry @ u.astype(float) for u in run.u], 1)
     pixels = through.project(lies[:, None] + moved)
     across = (pixels - pixels[:, :1]) * rest[:, None, 2:] / [camera.fx, camera.fy]
-    return np.where(known[:, None, None], np.concatenate([across, moved[..., 2:]], -1), 0.0)
+    # What goes along the view stays in its pixel: along the ray, not along z.
+    along = moved[..., 2:] * (rest / rest[:, 2:])[:, None]
+    return np.where(known[:, None, None], np.concatenate([across, np.zeros_like(across[..., :1])], -1) + along, 0.0)
