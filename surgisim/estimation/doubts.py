@@ -71,7 +71,7 @@ def spreads(wanted: Search, table: Mapping[str, dict]) -> dict[str, float]:
 def seen(
     trial: Trial, x: np.ndarray, tracks: Tracks, camera: Camera, view: View | None = None, worker: int = 0
 ) -> np.ndarray:
-    """How far every tracked point goes at x, as its pixel shows it at its depth of frame 0, camera frame [m], (K, T, 3).
+    """How far every tracked point goes at x, as its pixel shows it, camera frame [m], (K, T, 3).
 
     view: how the trial's tissue lies, if otherwise than the tracks say.
     """
@@ -85,7 +85,14 @@ def seen(
     known &= abs(simulator.support(carry) - 1) < ON_BODY
     moved = np.stack([carry @ u.astype(float) for u in run.u], 1)
     pixels = through.project(lies[:, None] + moved)
-    across = (pixels - pixels[:, :1]) * rest[:, None, 2:] / [camera.fx, camera.fy]
-    # What goes along the view stays in its pixel: along the ray, not along z.
-    along = moved[..., 2:] * (rest / rest[:, 2:])[:, None]
-    return np.where(known[:, None, None], np.concatenate([across, np.zeros_like(across[..., :1])], -1) + along, 0.0)
+    return np.where(known[:, None, None], as_shown(rest, pixels - pixels[:, :1], moved[..., 2], camera), 0.0)
+
+
+def as_shown(rest: np.ndarray, shift: np.ndarray, along: np.ndarray, camera: Camera) -> np.ndarray:
+    """Displacement, camera frame [m], (K, T, 3), of points at `rest`, (K, 3), whose pixels shift so [px], (K, T, 2).
+
+    along: how much farther off they go [m], (K, T), which stays in their pixel: along the ray, not along z.
+    """
+    across = shift * rest[:, None, 2:] / [camera.fx, camera.fy]
+    flat = np.concatenate([across, np.zeros_like(across[..., :1])], -1)
+    return flat + along[..., None] * (rest / rest[:, 2:])[:, None]

@@ -9,6 +9,7 @@ from scipy import sparse
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
 from surgisim.estimation.lay import Columns
+from surgisim.estimation.doubts import as_shown
 from surgisim.estimation.observation import Filmed
 from surgisim.estimation.search import search
 from surgisim.estimation.unknown import Unknown
@@ -87,3 +88,10 @@ def test_a_longer_lens_asks_for_shorter_lengths_and_softer_tissue():
     assert moved["corotated.E"] == pytest.approx(-2 * np.log(1.3))
     assert moved["newtonian.eta"] == pytest.approx(-2 * np.log(1.3))
     assert moved["corotated.nu"] == 0
+
+
+def test_what_pixels_show_of_a_displacement_is_that_displacement():
+    rest = points()
+    moved = np.random.default_rng(4).normal(0, 1e-6, (len(rest), 6, 3))
+    shift = CAMERA.project(rest[:, None] + moved) - CAMERA.project(rest)[:, None]
+    assert as_shown(rest, shift, moved[..., 2], CAMERA) == pytest.approx(moved, abs=1e-9)
