@@ -8,8 +8,8 @@ from scipy import sparse
 
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
-from surgisim.estimation.lay import Columns
 from surgisim.estimation.doubts import as_shown
+from surgisim.estimation.lay import Columns
 from surgisim.estimation.observation import Filmed
 from surgisim.estimation.search import search
 from surgisim.estimation.unknown import Unknown
