@@ -21,7 +21,7 @@ from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
 from surgisim.diagnosis.locate import worst
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import metric
-from surgisim.diagnosis.noise import Whitener, estimate, whitener
+from surgisim.diagnosis.noise import Whitener, by_frame, estimate, whitener
 from surgisim.diagnosis.nuisance import Group
 from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
 from surgisim.estimation.trial import at_once
@@ -219,6 +219,8 @@ def prepare_case(
     until = clip.until
     fitted = slice(0, until)
     noise = estimate(clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, clip.quiet()[fitted], *clip.nominal)
+    if clip.recording.astray:
+        noise = by_frame(noise, clip.moved, clip.seen)
     if settings.noise == "independent":
         noise = replace(
             noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0

@@ -36,12 +36,10 @@ SEEN = 0.6
 """Share of a stretch in which a point must be seen to tell of the noise there."""
 MOST_RUNS = 400
 """Likelihoods computed at most for a fit."""
-ALIKE, LASTS = 0.002, 0.97
-"""Distance [m] over which errors that still frames do not show are alike, and their correlation from frame to frame: a
-patch of tissue that has gone somewhere keeps its own (18 clips of family 27182: .5 at 1.5 mm, .15 at 3.5 mm; .92 a
-frame later, .75 after sixteen)."""
 PARTS = ("shared", "rigid", "tilt", "lasting", "white")
 """Variances of a `Noise`."""
+TOGETHER = 6
+"""Patterns over the points, those of all other frames, that a frame may share; what it has beside them is its own."""
 FILLINGS = 3
 """How often missing samples are drawn anew and the numbers fitted again, where samples are missing."""
 
@@ -70,6 +68,8 @@ class Noise:
     """a_k of every axis [1], (K, 3), of RMS 1 for each point; None where all are alike."""
     ways: np.ndarray | None = None
     """Directions of those axes, rows for each point, (K, 3, 3); None where they are x, y and z."""
+    rough: np.ndarray | None = None
+    """What is white besides in each frame, (T,); None where all frames are alike."""
 
     @property
     def scale(self) -> np.ndarray:
@@ -100,22 +100,13 @@ class Noise:
         """RMS error along the axis that is surest [m]."""
         return self.sigma * (1.0 if self.axes is None else float(np.sqrt((self.axes.min(1) ** 2).mean())))
 
-    def at_least(self, nominal: np.ndarray) -> "Noise":
-        """With errors of at least these [m], (K,): what still frames do not show is a patch's own and lasts."""
-        if self.sigma**2 >= (nominal**2).mean():
-            return self
-        share = float((self.level**2).mean() / (nominal**2).mean())
-        parts = {name: share * getattr(self, name) for name in PARTS}
-        parts["shared"] += 1.0 - sum(parts.values())
-        alike = {"length": min(self.length, ALIKE), "keep_shared": max(self.keep_shared, LASTS)}
-        return replace(self, level=np.maximum(nominal, 1e-9), **parts, **alike)
-
     def told(self) -> dict[str, Any]:
         """Its numbers as a diagnosis holds them: means over the points; `axes` along x, y and z or the
         points' own ways, None if alike."""
-        numbers = {k: float(np.mean(v)) for k, v in vars(self).items() if k not in ("axes", "ways")}
+        numbers = {k: float(np.mean(v)) for k, v in vars(self).items() if k not in ("axes", "ways", "rough")}
         axes = None if self.axes is None else self.axes.mean(0).tolist()
-        return numbers | {"axes": axes, "sigma": self.sigma, "unit": "m"}
+        rough = None if self.rough is None else float(np.mean(self.rough))
+        return numbers | {"axes": axes, "rough": rough, "sigma": self.sigma, "unit": "m"}
 
     def modes(self, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Patterns over the points, (K, K), orthonormal columns, and each one's shared and camera variance, (K,)."""
@@ -123,9 +114,10 @@ class Noise:
 
     def temporal(self, frames: int, shared: np.ndarray, camera: np.ndarray) -> np.ndarray:
         """Covariance in time of every pattern, (M, T, T)."""
-        return _temporal(
+        found = _temporal(
             np.arange(frames), shared, camera, self.keep_shared, self.keep_rigid, self.lasting, self.keep, self.white
         )
+        return found if self.rough is None else found + np.diag(self.rough[:frames])
 
     def draw(self, rest: np.ndarray, frames: int, rng: np.random.Generator) -> np.ndarray:
         """Noise as modelled [m], (K, T, 3)."""
@@ -231,13 +223,12 @@ def estimate(
 
     nominal: what the recording says of each point's noise [m], (K,); it decides where nothing can be estimated.
     axes: what it says of the three axes' shares of it [1], (K, 3), None if alike; ways: their directions, (K, 3, 3),
-    if not x, y and z. Where it does, `nominal` counts what
-    is wrong with a point that moves, too, and errors are not taken to be smaller (`Noise.at_least`).
+    if not x, y and z.
     Missing samples of a stretch are drawn from what the seen ones leave open, and the numbers fitted again.
     """
     if axes is not None:
         found = estimate(turned(moved, ways) / axes[:, None], seen, rest, still, nominal)
-        return replace(found.at_least(nominal), axes=axes, ways=ways)
+        return replace(found, axes=axes, ways=ways)
     level = np.maximum(_levels(moved, seen, nominal), 1e-9)
     rng = np.random.default_rng(0)
     most = MOST_POINTS if seen[:, still].all() else FEWER
@@ -257,6 +248,25 @@ def estimate(
         x = _fitted(filled, x, MOST_RUNS)
         noise = Noise(level, **_unpacked(x))
     return noise
+
+
+def by_frame(noise: Noise, moved: np.ndarray, seen: np.ndarray) -> Noise:
+    """With what each frame adds to it, as displacements [m], (K, T, 3), where `seen`, (K, T), show in no other frame.
+
+    Frames in which tissue moves are blurred, and followed less well than those that tell of the noise.
+    """
+    sure = noise.scale.argsort(1, kind="stable")[:, : 3 if noise.axes is None else 2]
+    along = np.take_along_axis(turned(moved, noise.ways) / noise.scale[:, None], sure[:, None], 2)
+    frames = np.arange(moved.shape[1])
+    rows = np.array(
+        [np.interp(frames, frames[s], p[s, a]) for p, s in zip(along, seen, strict=True) for a in range(p.shape[1])]
+    )
+    counted, variance = np.repeat(seen, sure.shape[1], axis=0), np.zeros(len(frames))
+    for t in frames:
+        shared = np.linalg.svd(np.delete(rows, t, axis=1), full_matrices=False)[0][:, :TOGETHER]
+        own = rows[:, t] - shared @ (shared.T @ rows[:, t])
+        variance[t] = (own**2)[counted[:, t]].sum() / max(counted[:, t].sum() - shared.shape[1], 1)
+    return replace(noise, rough=np.maximum(variance - sum(getattr(noise, name) for name in PARTS), 0.0))
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,17 @@ another place of it, another elastic law. None is read off one generator's recor
 who grip, glue, film and track are taken to be able to do.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis import perceived
 from surgisim.diagnosis.base import HELD, Base, by_held, displacement_gradient, tracks_of
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import hats, plane
+from surgisim.diagnosis.group import Group
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.noise import Noise, whitener
 from surgisim.diagnosis.ring_down import LATE, LATEST
@@ -71,23 +73,6 @@ ALIKE = 1.4
 PATTERNS = 14
 
 
-@dataclass(frozen=True)
-class Group:
-    """Directions of one kind."""
-
-    name: str
-    columns: np.ndarray
-    """At one prior standard deviation [m], (C, K, T, 3)."""
-    values: tuple[tuple[str, float, str], ...] = ()
-    """Name, prior standard deviation and unit of each direction that a reader would ask for, in order."""
-
-    def wider(self, times: float | np.ndarray) -> "Group":
-        """All directions some times as wide, or each, (C,)."""
-        each = np.broadcast_to(times, len(self.columns))
-        named = tuple((name, float(t) * sd, unit) for (name, sd, unit), t in zip(self.values, each, strict=False))
-        return Group(self.name, each[:, None, None, None] * self.columns, named)
-
-
 def of_base(
     clip: Clip, simulated: np.ndarray, error: np.ndarray, gradient: np.ndarray, drift: np.ndarray, noise: Noise,
     settings: Diagnosing,
@@ -97,8 +82,9 @@ def of_base(
     error: what a finer grid changes [m], (K, T, 3); gradient: displacement's [1], (3, K, T, 3); drift: sizes of its
     parts [m], (3,).
     """
-    groups = [*camera(clip, simulated), drifting(clip, drift), places(clip, gradient, noise), perceived(clip)]
-    return chosen([*groups, simulator(clip, error, settings.model_error)], settings)
+    groups = [*camera(clip, simulated), drifting(clip, drift), places(clip, gradient, noise)]
+    groups += [*perceived.groups(clip, simulated, noise), simulator(clip, error, settings.model_error)]
+    return chosen(groups, settings)
 
 
 def of_laws(
@@ -142,13 +128,6 @@ def positions(groups: list[Group], names: set[str]) -> list[int]:
         found += [at + n for n, (name, *_) in enumerate(group.values) if name in names]
         at += len(group.columns)
     return found
-
-
-def perceived(clip: Clip) -> Group:
-    """What the body and the grips were taken to be, as far as the recording says how sure of that it is."""
-    doubts = clip.recording.of(clip.kept).doubts
-    columns = np.stack(list(doubts.values())) if doubts else np.zeros((0, *clip.moved.shape))
-    return Group("perception", columns, tuple((name, 1.0, "standard deviations") for name in doubts))
 
 
 def camera(clip: Clip, simulated: np.ndarray) -> list[Group]:

@@ -72,6 +72,20 @@ class ModelError:
         return self.kept[key]
 
 
+def at_least(far: np.ndarray) -> np.ndarray:
+    """How far points go [m], (K,), and a little where they hardly do."""
+    return np.maximum(far, FLOOR * np.percentile(far, 99))
+
+
+def alike(rest: np.ndarray, far: np.ndarray) -> np.ndarray:
+    """Correlation of the field at points `rest` [m], (K, 3), that go `far` [m], (K,), with that at others, (K, K)."""
+    middle = np.average(rest, axis=0, weights=far**2)
+    away = np.linalg.norm(rest - middle, axis=1)
+    reach = REACH * np.sqrt(np.average(away**2, weights=far**2))
+    apart = np.linalg.norm(rest[:, None] - rest[None], axis=-1)
+    return np.exp(-0.5 * (apart / reach) ** 2)
+
+
 def model_error(
     seen: Observation, course: np.ndarray, free: np.ndarray, independent: float, path_fitted: bool = True
 ) -> ModelError:
@@ -84,12 +98,8 @@ def model_error(
     moved = np.linalg.norm(seen.displacement * used, axis=-1)
     at = int(np.argmax(np.where(used.any(-1).mean(0) > 0.5, course, -1.0)))
     far = moved[:, at] / max(abs(course[at]), 1e-9)
-    far = np.maximum(far, FLOOR * np.percentile(far, 99))
-    middle = np.average(seen.rest, axis=0, weights=far**2)
-    away = np.linalg.norm(seen.rest - middle, axis=1)
-    reach = REACH * np.sqrt(np.average(away**2, weights=far**2))
-    apart = np.linalg.norm(seen.rest[:, None] - seen.rest[None], axis=-1)
-    value, vector = np.linalg.eigh(np.exp(-0.5 * (apart / reach) ** 2))
+    far = at_least(far)
+    value, vector = np.linalg.eigh(alike(seen.rest, far))
     chosen = value > LEAST * value[-1]
     modes = SHARE * vector[:, chosen] * np.sqrt(value[chosen])
     pulled = modes - np.average(modes, axis=0, weights=far**2) if path_fitted else modes

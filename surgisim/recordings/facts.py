@@ -26,7 +26,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def facts(path: Path, expected: str) -> dict[str, Any]:
-    """recording.json: name, fps, frames, unit [m], density, gravity, tier, starts, doubts."""
+    """recording.json: name, fps, frames, unit [m], density, gravity, tier, starts, doubts, astray."""
     body = read_json(path)
     needed = ("format", "name", "fps", "frames", "length_unit", "density_kg_m3", "gravity_m_s2", "tier")
     missing = [key for key in needed if key not in body]
@@ -57,9 +57,13 @@ def facts(path: Path, expected: str) -> dict[str, Any]:
     doubts = body.get("doubts", [])
     if not isinstance(doubts, list) or not all(isinstance(each, str) for each in doubts):
         raise Problem(f"{path}: 'doubts' is {doubts!r}, but a list of names is wanted.")
+    astray = body.get("astray", 0.0)
+    if not _number(astray) or astray < 0:
+        raise Problem(f"{path}: 'astray' is {astray!r}, but a share of how far points go is wanted, 0 or more.")
     return {
         "name": name,
         "doubts": doubts,
+        "astray": float(astray),
         "fps": float(fps),
         "frames": frames,
         "unit": UNITS[unit],

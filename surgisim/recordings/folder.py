@@ -1,7 +1,8 @@
 """A recording as a folder: recording.json, rest.ply, fixed.json, tracks.npz; grip.npz, split.json if any.
 
 recording.json  format, name, fps, frames, length_unit (m, cm or mm; of every file), density_kg_m3 or null,
-                gravity_m_s2 [x, y, z] or null, tier; optional starts: "settled" (default) or "released"
+                gravity_m_s2 [x, y, z] or null, tier; optional starts: "settled" (default) or "released";
+                astray: of how far a point has gone, how far its track is off, beside sigma
 rest.ply        closed triangle mesh of the body at rest
 fixed.json      {"boxes": [{"min": [x, y, z], "max": [x, y, z]}]}: regions of rest space held still
 grip.npz        center_rest (J, 3), radius (J,), position (J, T, 3), active (J, T): translating grips; optional rim
@@ -104,6 +105,7 @@ def read_recording(folder: Path) -> Recording:
         axes=None if axes is None else axes / np.sqrt((axes**2).mean(1, keepdims=True)),
         ways=ways,
         doubts=_doubts(folder, told["doubts"], tracks.get("doubts"), unit),
+        astray=told["astray"],
         split=split_of(folder / "split.json", frames) if (folder / "split.json").is_file() else None,
     )
 
@@ -135,6 +137,8 @@ def encoded_recording(recording: Recording) -> dict[str, bytes]:
         tracks["axes"] = recording.axes
     if recording.ways is not None:
         tracks["ways"] = recording.ways
+    if recording.astray:
+        told["astray"] = recording.astray
     if recording.doubts:
         told["doubts"] = list(recording.doubts)
         tracks["doubts"] = np.stack(list(recording.doubts.values())).astype(np.float32)

@@ -25,7 +25,7 @@ HALF = 0.5
 """Tissue over a voxel on the surface."""
 ASTRAY = 0.04
 """Of how far a point has gone across the view, how far its track is off, beside what the tracker says of it: of 18
-clips of family 27182 .03 to .07 (root mean square outside the grips), alike over 2 mm and for as long as it is away."""
+clips of family 27182 .03 to .07 (root mean square outside the grips)."""
 MARGIN = 4
 """Empty voxels around the body."""
 
@@ -36,9 +36,8 @@ def recording_of(
 ) -> Recording:  # fmt: skip
     """Tracked points, grips, body and held boundary of a clip, in the camera's frame.
 
-    A point's noise is what the tracker says of it across and along its own view, and more where it has gone far. Frames
-    held out after the fitted ones are held out here too; those between are fitted. Raises Problem where no point was
-    seen in frame 0.
+    A point's noise is what the tracker says of it across and along its own view. Frames held out after the fitted ones
+    are held out here too; those between are fitted. Raises Problem where no point was seen in frame 0.
     """
     first = tracks.xyz[:, 0]
     kept = np.isfinite(first).all(1) & tracks.visible[:, 0]
@@ -47,8 +46,6 @@ def recording_of(
     points = tracks.xyz[kept]
     visible = tracks.visible[kept] & np.isfinite(points).all(-1)
     across, along = np.nanmedian(np.where(visible[..., None], tracks.sigma_xyz[kept].astype(float), np.nan), axis=1).T
-    gone = np.where(visible, np.linalg.norm((points - points[:, :1])[..., :2], axis=-1), np.nan)
-    across = np.hypot(across, ASTRAY * np.sqrt(np.nanmean(gone**2, axis=1)))
     # A guess is no measurement, however far off it is said to be: its error is one for all points.
     along = np.where(along < MEASURED * points[:, 0, 2], along, points[:, 0, 2])
     noise = np.stack([across, across, along], -1)
@@ -72,6 +69,7 @@ def recording_of(
         axes=noise / sigma[:, None],
         ways=rays(points[:, 0].astype(float)),
         doubts={str(name): moved[kept].astype(float) for name, moved in zip(doubts.names, doubts.moved, strict=True)},
+        astray=ASTRAY,
         split=split,
     )
 

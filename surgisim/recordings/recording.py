@@ -48,6 +48,8 @@ class Recording:
     doubts: dict[str, np.ndarray] = field(default_factory=dict)
     """How much farther each point would go were something otherwise by one standard deviation that body and grips were
     taken to be [m], (K, T, 3), by its name."""
+    astray: float = 0.0
+    """Of how far a point has gone, how far its track is off [1]."""
     split: dict[str, tuple[int, int]] | None = None
     """Frames `fit` and `held_out`, first and one past the last."""
 

@@ -8,7 +8,7 @@ import pytest
 from planted import NOISE
 
 from surgisim.diagnosis.metric import metric
-from surgisim.diagnosis.noise import Noise, estimate, whitener
+from surgisim.diagnosis.noise import Noise, by_frame, estimate, whitener
 
 FRAMES = 80
 
@@ -89,25 +89,18 @@ def test_it_is_told_in_plain_numbers_whether_axes_are_alike_or_not(drawn, axes):
     assert told["axes"] == (None if axes is None else pytest.approx(AXES.tolist()))
 
 
-def test_errors_that_still_frames_do_not_show_are_at_least_as_large_as_said(drawn):
-    rest, noise = drawn[0][:20], drawn[1].of(np.arange(20))
-    axes, seen = np.tile(AXES, (20, 1)), np.ones((20, FRAMES), bool)
-    tracks = replace(noise, axes=axes).draw(rest, FRAMES, np.random.default_rng(7))
-    told = (tracks, seen, rest, np.ones(FRAMES, bool))
-    quiet, loud = (estimate(*told, np.full(20, sigma), axes) for sigma in (2e-5, 3e-3))
-    assert quiet.sigma == pytest.approx(noise.sigma, rel=0.3)
-    assert loud.sigma == pytest.approx(3e-3)
-    assert loud.keep_shared >= 0.97
-    assert loud.length <= 0.002
-    apart = estimate(*told, np.linspace(1e-3, 5e-3, 20), axes)
-    assert apart.level == pytest.approx(np.linspace(1e-3, 5e-3, 20))
-    assert apart.sigma == pytest.approx(np.sqrt((apart.level**2).mean()))
-    assert apart.plain == pytest.approx(np.sqrt(0.15) * apart.sigma)
-    # A smooth change as large as that is nothing then; without axes, frames at rest have the word.
-    bent = 3e-3 * np.exp(-(((rest[:, :1] - 0.02) / 0.015) ** 2))[..., None] * np.linspace(0, 1, FRAMES)[:, None] * AXES
-    beyond = [(whitener(n, rest, seen)(bent) ** 2).sum() for n in (loud, quiet)]
-    assert beyond[0] < 200 < 2000 < beyond[1]
-    assert estimate(*told, np.full(20, 3e-3)).sigma < 1e-3
+def test_frames_in_which_each_point_is_off_by_its_own_count_less(drawn):
+    rest, noise, tracks, seen = drawn
+    swept = np.sin(np.arange(FRAMES) / 9) * np.exp(-((rest[:, :1] - 0.02) ** 2) / 0.01**2)
+    blurred = (np.arange(FRAMES) >= 10) & (np.arange(FRAMES) < 20)
+    field = tracks + 5e-3 * swept[..., None] * AXES
+    field += 4 * noise.sigma * np.random.default_rng(9).standard_normal(field.shape) * blurred[:, None]
+    found = by_frame(noise, field, seen)
+    own = noise.sigma**2 / (noise.level**2).mean()
+    assert found.rough[blurred] == pytest.approx(16 * own, rel=0.35)
+    assert found.rough[~blurred].max() < own
+    assert whitener(found, rest, seen)(tracks).std() < whitener(noise, rest, seen)(tracks).std()
+    assert json.loads(json.dumps(found.told()))["rough"] == pytest.approx(found.rough.mean())
 
 
 def test_a_constant_of_a_point_is_no_residual(drawn):

@@ -42,3 +42,14 @@ def test_the_ball_goes_with_the_jaws(lost):
 def test_tissue_that_is_seen_corrects_jaws_whose_motion_is_measured_a_little_short():
     _, _, xy, seen = pulled([Pull((127, 40), (70, 50), WAY, np.ones(T, bool))])
     assert np.linalg.norm(carried(xy, np.ones_like(seen), 0.85 * steps())[-1] - WAY[-1]) < 3
+
+
+def test_the_course_of_a_way_is_that_of_the_tissue_around():
+    _, _, xy, seen = pulled([Pull((127, 40), (70, 50), WAY, np.ones(T, bool))])
+    ring = np.linalg.norm(xy[:, 0] - (70, 50), axis=-1) <= 6
+    xy = xy.copy()
+    xy[ring, 3:] += np.random.default_rng(0).normal(0, 1.5, (T - 3, 2))
+    way = carried(xy, np.ones_like(seen), None)
+    share = way @ WAY[-1] / np.linalg.norm(WAY[-1]) / np.linalg.norm(way[-1])
+    truth = WAY @ WAY[-1] / np.linalg.norm(WAY[-1]) ** 2
+    assert np.sqrt(((share - truth) ** 2).mean()) < 0.02

@@ -1,0 +1,136 @@
+"""What a residual may hold because body, grips and tracks were read off a video, as groups of directions (nuisance.py).
+
+A recording of a video says so itself: by `doubts`, what body and grips were taken to be, and by `astray`, how far
+tracks are off where tissue has gone somewhere. One that was measured has neither.
+"""
+
+import numpy as np
+
+from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.group import Group, none
+from surgisim.diagnosis.noise import Noise
+from surgisim.estimation.model_error import LEAST, alike, at_least
+
+SHAPE, BENT = 0.3, 0.1
+"""Of how far tissue is carried, how far that is off in a pull, and how far it is off halfway beyond half of that:
+standard deviations."""
+ROUGH, NEAR = 0.5, 0.003
+"""Share of that which is a place's own, and over what distance that is alike [m]; the rest goes as far as what an
+estimation takes a field to be alike over."""
+SWING, CHANGES = 0.5, 0.03
+"""Of the geometric mean of how far tissue was pulled and how far it still swings, how far its swing is off, and over
+what time that is alike [s]: parts of a body that was guessed swing at paces of their own, so that what is right at
+first is not for long."""
+LEFT = 0.3
+"""How far a track is still off once its point is back, as a share of how far it was off when that was farthest: of nine
+clips of family 27182 .007 to .019 of the way, beside .03 to .07 on it."""
+WALKS = 4
+"""Courses of a track's error over how far its point has gone, the first of a random walk's (Karhunen and Loeve): a
+track gathers it on its way, and has about what it had in a place when it is there again."""
+SLIGHT, MOST = 1.0, 400
+"""Directions are left out where a standard deviation is worth less chi square than that, and beyond the first ones."""
+
+
+def groups(clip: Clip, simulated: np.ndarray, noise: Noise) -> list[Group]:
+    """All of them; simulated: displacement of the points by the base [m], (K, T, 3)."""
+    return [perceived(clip), shape(clip, simulated, noise), swing(clip, simulated, noise), astray(clip, noise)]
+
+
+def perceived(clip: Clip) -> Group:
+    """What the body and the grips were taken to be, as far as the recording says how sure of that it is."""
+    doubts = clip.recording.of(clip.kept).doubts
+    columns = np.stack(list(doubts.values())) if doubts else np.zeros((0, *clip.moved.shape))
+    return Group("perception", columns, tuple((name, 1.0, "standard deviations") for name in doubts))
+
+
+def shape(clip: Clip, simulated: np.ndarray, noise: Noise) -> Group:
+    """What a guessed body gets wrong in a pull: each place is carried farther or less far, in proportion to the pull,
+    and by somewhat more or less than that halfway."""
+    if not clip.recording.doubts:
+        return none("shape", simulated)
+    far, course = _carried(clip, simulated, noise)
+    courses = clip.held * np.stack([SHAPE * course, BENT * 4 * course * (1 - course)])
+    return Group("shape", _fields(clip, far, courses, noise))
+
+
+def swing(clip: Clip, simulated: np.ndarray, noise: Noise) -> Group:
+    """How a guessed body swings otherwise once it is let go."""
+    begins = [last + 1 for _, last in clip.releases(clip.frames - 1)]
+    if not clip.recording.doubts or not begins:
+        return none("swing", simulated)
+    far, course = _carried(clip, simulated, noise)
+    free = ~clip.held & (np.arange(clip.frames) >= min(begins))
+    # How far it still swings: the farthest that is to come, until it is taken hold of again.
+    still, farthest = np.zeros(clip.frames), 0.0
+    for t in reversed(range(clip.frames)):
+        farthest = max(farthest, abs(course[t])) if free[t] else 0.0
+        still[t] = farthest
+    apart = np.abs(clip.time[:, None] - clip.time) / CHANGES
+    value, vector = np.linalg.eigh(np.sqrt(still)[:, None] * np.exp(-apart) * np.sqrt(still))
+    kept = value > LEAST * value[-1]
+    return Group("swing", _fields(clip, far, SWING * (vector[:, kept] * np.sqrt(value[kept])).T, noise))
+
+
+def astray(clip: Clip, noise: Noise) -> Group:
+    """Tracks of points that have gone somewhere: each off by a share of its way, and still by some once it is back."""
+    share, moved = clip.recording.astray, noise.told_of(clip.moved)
+    if not share:
+        return none("astray", moved)
+    far, frame = np.linalg.norm(moved, axis=-1), np.arange(clip.frames)
+    # Every point that is kept is seen in some of the fitted frames.
+    gone = np.stack([np.interp(frame, frame[s], f[s]) for f, s in zip(far, clip.seen, strict=True)])
+    farthest = gone.max(1, keepdims=True)
+    k = np.arange(1, WALKS + 1)[:, None, None] - 0.5
+    walks = farthest * np.sqrt(2) * np.sin(k * np.pi * gone / np.maximum(farthest, 1e-12)) / (k * np.pi)
+    each = np.concatenate([walks, LEFT * (np.maximum.accumulate(gone, axis=1) - gone)[None]])
+    ways = _ways(clip)
+    worth = np.stack([_worth(share * e[..., None] * way[:, None], clip, noise) for e in each for way in ways])
+    order = np.argsort(worth, axis=None)[::-1][:MOST]
+    columns = []
+    for index in order[worth.flat[order] > SLIGHT]:
+        which, k = np.unravel_index(index, worth.shape)
+        column = np.zeros_like(moved)
+        column[k] = share * each[which // len(ways), k][:, None] * ways[which % len(ways)][k]
+        columns.append(column)
+    return Group("astray", np.stack(columns)) if columns else none("astray", moved)
+
+
+def _carried(clip: Clip, simulated: np.ndarray, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
+    """How far each point is carried at most [m], (K,), and which share of that all are in every frame, (T,)."""
+    told = noise.told_of(simulated)
+    top = int(np.linalg.norm(told[:, : clip.until], axis=-1).mean(0).argmax())
+    most = told[:, top]
+    return at_least(np.linalg.norm(most, axis=-1)), np.einsum("kta,ka->t", told, most) / max((most**2).sum(), 1e-12)
+
+
+def _fields(clip: Clip, far: np.ndarray, courses: np.ndarray, noise: Noise) -> np.ndarray:
+    """Fields in space with each course in time (N, T), along every direction that can be told, at one standard
+    deviation [m], (C, K, T, 3), where points are carried `far` [m], (K,)."""
+    apart = np.linalg.norm(clip.rest[:, None] - clip.rest[None], axis=-1)
+    kernel = (1 - ROUGH) * alike(clip.rest, far) + ROUGH * np.exp(-0.5 * (apart / NEAR) ** 2)
+    value, vector = np.linalg.eigh(far[:, None] * kernel * far)
+    modes = vector * np.sqrt(np.maximum(value, 0.0))
+    ways, each = np.stack(_ways(clip)), []
+    sigma = noise.sigma * noise.surest / np.sqrt((noise.level**2).mean())
+    weight = clip.seen[:, : clip.until] / sigma[:, None] ** 2
+    worth = np.einsum("kq,nt,kt->nq", modes**2, courses[:, : clip.until] ** 2, weight)
+    order = np.argsort(worth, axis=None)[::-1][: MOST // len(ways)]
+    for index in order[worth.flat[order] > SLIGHT]:
+        n, q = np.unravel_index(index, worth.shape)
+        each += [modes[:, q, None, None] * courses[n][None, :, None] * way[:, None] for way in ways]
+    return np.stack(each) if each else np.zeros((0, *clip.moved.shape))
+
+
+def _ways(clip: Clip) -> list[np.ndarray]:
+    """Directions of which the recording is surest, (K, 3) each: two across the view, or x, y and z."""
+    mine = clip.recording.of(clip.kept)
+    if mine.ways is None:
+        return list(np.broadcast_to(np.eye(3)[:, None], (3, len(clip.rest), 3)))
+    return [mine.ways[:, a] for a in range(2)]
+
+
+def _worth(column: np.ndarray, clip: Clip, noise: Noise) -> np.ndarray:
+    """Chi square of a direction [m], (..., K, T, 3), in the fitted frames, by point, (..., K)."""
+    sigma = noise.sigma * noise.surest / np.sqrt((noise.level**2).mean())
+    until = clip.until
+    return ((column[..., :until, :] ** 2).sum(-1) * clip.seen[:, :until]).sum(-1) / sigma**2
