@@ -8,7 +8,7 @@ from surgisim.config.base import Settings
 
 Kinds = Literal[
     "release", "held", "lag", "scale", "drift", "place", "simulator", "grip radius", "grip centre", "grip firmness",
-    "grip path", "elastic law", "closing",
+    "grip path", "elastic law", "closing", "perception", "shape", "swing", "astray", "jumps",
 ]  # fmt: skip
 """What a recording leaves open, by name."""
 
@@ -38,7 +38,7 @@ class Diagnosing(Settings):
     """How tracking errors are taken to be related [-]."""
     offsets: bool = True
     """Whether every point may have a constant error of its own [1]."""
-    without: Annotated[list[Kinds], Field(max_length=16)] = []
+    without: Annotated[list[Kinds], Field(max_length=24)] = []
     """Kinds of nuisances that are left out, to see what each is worth [name]."""
     model_error: float = Field(1.0, ge=0, le=10)
     """Times the simulator's error as a finer grid shows it [1]."""

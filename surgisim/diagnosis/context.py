@@ -13,6 +13,7 @@ from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener
 from surgisim.diagnosis.nuisance import Group, positions, release, span
+from surgisim.diagnosis.perceived import OF_TRACKS
 from surgisim.diagnosis.prospect import Prospect, prospect
 from surgisim.diagnosis.saturated import Saturated, SmoothFit, saturated
 
@@ -121,8 +122,14 @@ class Case:
 
     @cached_property
     def nuisance_ratio(self) -> float:
-        """Squares of the nuisances at their most likely values, over what all but 5 % of the nulls stay below [1]."""
-        own, nulls = (self.space.likely(v) for v in (self.z, self.nulls))
+        """Squares of the nuisances at their most likely values, over what all but 5 % of the nulls stay below [1].
+
+        That a track is lost says nothing of the tissue.
+        """
+        counted = np.ones(self.space.columns.shape[1], bool)
+        for name in OF_TRACKS:
+            counted[span(self.groups, name)] = False
+        own, nulls = (self.space.likely(v)[counted] for v in (self.z, self.nulls))
         return float((own**2).sum() / np.quantile((nulls**2).sum(0), 0.95))
 
     @cached_property

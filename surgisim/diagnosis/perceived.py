@@ -9,7 +9,7 @@ import numpy as np
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.group import Group, none
 from surgisim.diagnosis.noise import Noise
-from surgisim.estimation.model_error import LEAST, alike, at_least
+from surgisim.estimation.model_error import LEAST, alike
 
 SHAPE, BENT = 0.3, 0.1
 """Of how far tissue is carried, how far that is off in a pull, and how far it is off halfway beyond half of that:
@@ -27,13 +27,25 @@ clips of family 27182 .007 to .019 of the way, beside .03 to .07 on it."""
 WALKS = 4
 """Courses of a track's error over how far its point has gone, the first of a random walk's (Karhunen and Loeve): a
 track gathers it on its way, and has about what it had in a place when it is there again."""
+JUMPS, LIKELY, ASIDE = 4.0, 0.5, 1.5
+"""How far a track must step aside from the middle one of its neighbours to have jumped: times what the middle point
+does, at least as a share of its noise, and times what the neighbours do."""
+BESIDE, MOST_JUMPS = 8, 200
+"""Neighbours of a point, and jumps that are counted at most, the largest first."""
+FAINT = 0.1
+"""Where tissue hardly moves, what a guessed body gets wrong is as large as where it goes this share of the farthest."""
 SLIGHT, MOST = 1.0, 400
 """Directions are left out where a standard deviation is worth less chi square than that, and beyond the first ones."""
 
 
+OF_TRACKS = ("astray", "jumps")
+"""Groups of single tracks' errors."""
+
+
 def groups(clip: Clip, simulated: np.ndarray, noise: Noise) -> list[Group]:
     """All of them; simulated: displacement of the points by the base [m], (K, T, 3)."""
-    return [perceived(clip), shape(clip, simulated, noise), swing(clip, simulated, noise), astray(clip, noise)]
+    body = [perceived(clip), shape(clip, simulated, noise), swing(clip, simulated, noise)]
+    return [*body, astray(clip, noise), jumps(clip, noise)]
 
 
 def perceived(clip: Clip) -> Group:
@@ -95,12 +107,36 @@ def astray(clip: Clip, noise: Noise) -> Group:
     return Group("astray", np.stack(columns)) if columns else none("astray", moved)
 
 
+def jumps(clip: Clip, noise: Noise) -> Group:
+    """Tracks that step aside from their neighbours', and stay there: each has a constant of its own from there on."""
+    near = np.argsort(np.linalg.norm(clip.rest[:, None] - clip.rest[None], axis=-1), axis=1)[:, 1 : BESIDE + 1]
+    if not clip.recording.astray or near.shape[1] < BESIDE:
+        return none("jumps", clip.moved)
+    ways, frame = np.stack(_ways(clip), 1), np.arange(clip.frames)
+    along = np.einsum("kwa,kta->kwt", ways, clip.moved) / noise.surest[:, None, None]
+    path = np.array([[np.interp(frame, frame[s], a[s]) for a in p] for p, s in zip(along, clip.seen, strict=True)])
+    step = np.diff(path, axis=-1)
+    beside = np.median(step[near], axis=1)
+    own, theirs = np.linalg.norm(step - beside, axis=1), np.linalg.norm(beside, axis=1)
+    # Tissue that is dragged along by less than its neighbours has not jumped.
+    large = own > np.maximum(JUMPS * np.maximum(np.median(own, axis=0), LIKELY), ASIDE * theirs)
+    columns = []
+    for k, t in sorted(zip(*np.nonzero(large), strict=True), key=lambda at: -own[at])[:MOST_JUMPS]:
+        for way in ways[k]:
+            column = np.zeros_like(clip.moved)
+            column[k, t + 1 :] = own[k, t] * noise.surest[k] * way
+            columns.append(column)
+    return Group("jumps", np.stack(columns)) if columns else none("jumps", clip.moved)
+
+
 def _carried(clip: Clip, simulated: np.ndarray, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
     """How far each point is carried at most [m], (K,), and which share of that all are in every frame, (T,)."""
     told = noise.told_of(simulated)
     top = int(np.linalg.norm(told[:, : clip.until], axis=-1).mean(0).argmax())
     most = told[:, top]
-    return at_least(np.linalg.norm(most, axis=-1)), np.einsum("kta,ka->t", told, most) / max((most**2).sum(), 1e-12)
+    far = np.linalg.norm(most, axis=-1)
+    course = np.einsum("kta,ka->t", told, most) / max((most**2).sum(), 1e-12)
+    return np.maximum(far, FAINT * np.percentile(far, 99)), course
 
 
 def _fields(clip: Clip, far: np.ndarray, courses: np.ndarray, noise: Noise) -> np.ndarray:

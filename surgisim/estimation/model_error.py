@@ -72,11 +72,6 @@ class ModelError:
         return self.kept[key]
 
 
-def at_least(far: np.ndarray) -> np.ndarray:
-    """How far points go [m], (K,), and a little where they hardly do."""
-    return np.maximum(far, FLOOR * np.percentile(far, 99))
-
-
 def alike(rest: np.ndarray, far: np.ndarray) -> np.ndarray:
     """Correlation of the field at points `rest` [m], (K, 3), that go `far` [m], (K,), with that at others, (K, K)."""
     middle = np.average(rest, axis=0, weights=far**2)
@@ -98,7 +93,7 @@ def model_error(
     moved = np.linalg.norm(seen.displacement * used, axis=-1)
     at = int(np.argmax(np.where(used.any(-1).mean(0) > 0.5, course, -1.0)))
     far = moved[:, at] / max(abs(course[at]), 1e-9)
-    far = at_least(far)
+    far = np.maximum(far, FLOOR * np.percentile(far, 99))
     value, vector = np.linalg.eigh(alike(seen.rest, far))
     chosen = value > LEAST * value[-1]
     modes = SHARE * vector[:, chosen] * np.sqrt(value[chosen])

@@ -23,7 +23,7 @@ FITTED = 0.7
 """Share of the frames that are fitted where none were held out after them."""
 HALF = 0.5
 """Tissue over a voxel on the surface."""
-ASTRAY = 0.04
+ASTRAY = 0.06
 """Of how far a point has gone across the view, how far its track is off, beside what the tracker says of it: of 18
 clips of family 27182 .03 to .07 (root mean square outside the grips)."""
 MARGIN = 4
