@@ -4,6 +4,7 @@ import numpy as np
 
 from surgisim.diagnosis import nuisance
 from surgisim.diagnosis.noise import Noise
+from surgisim.diagnosis.perceived import BY_VIDEO
 from surgisim.diagnosis.saturated import smooth_part
 
 LEAST = 3
@@ -34,18 +35,20 @@ def _mean(left: np.ndarray, seen: np.ndarray, span: slice) -> tuple[np.ndarray, 
     return left[:, span].sum(1) / np.maximum(count, 1)[:, None], count
 
 
-def with_drift(case, simulated: np.ndarray) -> np.ndarray:
-    """A prediction with the drift of the camera that is likeliest beside it, over all frames [m], (K, T, 3)."""
-    mine = nuisance.span(case.groups, "drift")
-    if mine.start == mine.stop:
+def as_filmed(case, simulated: np.ndarray) -> np.ndarray:
+    """A prediction with what is likeliest beside it of the camera's drift and of what a video gets wrong, over all
+    frames [m], (K, T, 3)."""
+    groups = [g for g in case.groups if g.name in ("drift", *BY_VIDEO)]
+    if not groups:
         return simulated
-    columns = next(g.columns for g in case.groups if g.name == "drift")
     left, ahead = case.clip.moved - simulated, case.prospect
     if ahead is None:
         likely = case.space.likely(case.whiten(left[:, : case.clip.until]))
     else:
         likely = ahead.space_all.likely(ahead.whiten_all(left))
-    return simulated + np.tensordot(likely[mine], columns, 1)
+    for group in groups:
+        simulated = simulated + np.tensordot(likely[nuisance.span(case.groups, group.name)], group.columns, 1)
+    return simulated
 
 
 def rms(case, simulated) -> tuple[float, float | None]:

@@ -43,11 +43,13 @@ class Finding:
 
 def judge(block: Block, whiten, space: Metric, cleared: np.ndarray, source: int, seen: np.ndarray) -> list[Finding]:
     """Every hypothesis of a block against residuals that `space` cleared, (N, 1 + D): the recording's, then nulls."""
-    white = whiten(block.columns.astype(np.float32)).T
-    gram = space.gram(white, white)
-    shadow = (white.T @ cleared).astype(float)
     mask = seen[None, :, :, None]
     plain = np.einsum("ckti,dkti->cd", block.columns * mask, block.columns, optimize=True) / seen.sum()
+    # Whitening is done in single precision, which what stiffens exponentially leaves where tissue is stretched far.
+    size = np.sqrt(np.maximum(np.diag(plain), 1e-60))
+    white = whiten((block.columns / size[:, None, None, None]).astype(np.float32)).T
+    gram = space.gram(white, white) * size[:, None] * size
+    shadow = (white.T @ cleared).astype(float) * size[:, None]
     return [weigh(h, gram, shadow, plain, source) for h in block.hypotheses]
 
 

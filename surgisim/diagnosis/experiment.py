@@ -50,8 +50,9 @@ def _instead(clip: Clip, motion: Motion) -> Clip:
     shape = (len(recording.sigma), frames)
     unseen = np.full((*shape, 3), np.nan, np.float32)
     planned = replace(
-        recording, motion=motion, points=unseen, visible=np.zeros(shape, bool), place=recording.attached(), split=None
-    )
+        recording, motion=motion, points=unseen, visible=np.zeros(shape, bool), place=recording.attached(), split=None,
+        doubts={},
+    )  # fmt: skip
     return replace(clip, recording=planned, late=None, moved=np.zeros((len(clip.kept), frames, 3)))
 
 

@@ -6,7 +6,7 @@ way to the next, which they must confirm. What they cannot show, because the eff
 where the fitted frames leave no doubt.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import expit
@@ -14,7 +14,7 @@ from scipy.special import expit
 from surgisim.diagnosis import calibration, candidates
 from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.context import Case
-from surgisim.diagnosis.errors import bootstrap, noise_floor, residual, rms, with_drift
+from surgisim.diagnosis.errors import as_filmed, bootstrap, noise_floor, residual, rms
 from surgisim.diagnosis.evidence import Scores, best
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint, least, prediction
@@ -235,7 +235,7 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
 
 def _unfit(case: Case, fitted: Joint, noise: Noise) -> bool:
     """Whether frames held out are farther off than a recording is beside what it holds, the camera's drift aside."""
-    left = rms(case, with_drift(case, fitted.moved))[1]
+    left = rms(case, as_filmed(case, fitted.moved))[1]
     return left is not None and left > calibration.UNFIT * noise_floor(noise)
 
 
@@ -345,10 +345,11 @@ def cos(case: Case, a: Refit, b: Refit) -> float:
 def noise_beside(case: Case, after: np.ndarray) -> Noise:
     """The noise with an effect taken off: then quiet frames show it alone."""
     clip, quiet = case.clip, slice(0, case.clip.until)
-    return estimate(
+    found = estimate(
         residual(case, after, False, whole=True)[:, quiet], clip.seen[:, quiet], clip.rest, clip.quiet()[quiet],
         *clip.nominal,
     )  # fmt: skip
+    return replace(found, rough=case.noise.rough)
 
 
 def borne_out(case: Case, after: np.ndarray) -> float:
@@ -359,7 +360,7 @@ def borne_out(case: Case, after: np.ndarray) -> float:
     hardly reach.
     """
     until = case.clip.until
-    both = (with_drift(case, s) for s in (case.base.simulated, after))
+    both = (as_filmed(case, s) for s in (case.base.simulated, after))
     before, left = (residual(case, s, False, rest_only=False)[:, :until] for s in both)
     change = float(((before - left) ** 2).sum())
     return float((before**2).sum() - (left**2).sum()) / change if change > 0 else -1.0

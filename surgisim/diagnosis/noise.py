@@ -97,8 +97,11 @@ class Noise:
 
     @property
     def plain(self) -> float:
-        """RMS error along the axis that is surest [m]."""
-        return self.sigma * (1.0 if self.axes is None else float(np.sqrt((self.axes.min(1) ** 2).mean())))
+        """RMS error along the axis that is surest [m], of all frames."""
+        more = 0.0 if self.rough is None else float(self.rough.mean() * (self.level**2).mean())
+        return float(np.hypot(self.sigma, np.sqrt(more))) * (
+            1.0 if self.axes is None else float(np.sqrt((self.axes.min(1) ** 2).mean()))
+        )
 
     def told(self) -> dict[str, Any]:
         """Its numbers as a diagnosis holds them: means over the points; `axes` along x, y and z or the

@@ -40,6 +40,8 @@ SLIGHT, MOST = 1.0, 400
 
 OF_TRACKS = ("astray", "jumps")
 """Groups of single tracks' errors."""
+BY_VIDEO = ("perception", "shape", "swing", *OF_TRACKS)
+"""All groups."""
 
 
 def groups(clip: Clip, simulated: np.ndarray, noise: Noise) -> list[Group]:

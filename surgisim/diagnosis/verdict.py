@@ -11,7 +11,7 @@ from surgisim.artifacts.physics import Physics
 from surgisim.diagnosis import calibration, candidates, words
 from surgisim.diagnosis.clip import PHASES
 from surgisim.diagnosis.context import Case
-from surgisim.diagnosis.errors import errors, residual, rms, with_drift
+from surgisim.diagnosis.errors import as_filmed, errors, residual, rms
 from surgisim.diagnosis.evidence import highest
 from surgisim.diagnosis.experiment import separating
 from surgisim.diagnosis.hypothesis import Hypothesis
@@ -230,7 +230,7 @@ def _words(case: Case, said_of: Judgement, refits, laws, z, held_out: dict) -> s
     verdict, chosen = said_of.verdict, said_of.chosen
     if verdict == "nothing detectable":
         # What the camera did there is no misfit.
-        before, noise = rms(case, with_drift(case, said_of.after))[1], held_out["noise_floor"]
+        before, noise = rms(case, as_filmed(case, said_of.after))[1], held_out["noise_floor"]
         later = (before, noise) if before is not None and before > calibration.SHOWS * noise else None
         return words.nothing(1e-3 * detectable(case, laws)[0], later) + words.beside(told(case, said_of.after))
     if said_of.named:

@@ -13,7 +13,7 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import diagnose, nuisance
 from surgisim.diagnosis.base import SPREAD, Known, carried, displacement_gradient, tracks_of
 from surgisim.diagnosis.diagnose import whitened
-from surgisim.diagnosis.errors import rms, with_drift
+from surgisim.diagnosis.errors import as_filmed, rms
 from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.judgement import borne_out
@@ -213,7 +213,7 @@ def test_what_the_camera_did_is_no_misfit(case):
         np.array(rms(*told))
         for told in (
             (case, case.base.simulated), (walked, case.base.simulated),
-            (walked, with_drift(walked, case.base.simulated)),
+            (walked, as_filmed(walked, case.base.simulated)),
         )
     )  # fmt: skip
     assert (plain > 1.3 * still).all()

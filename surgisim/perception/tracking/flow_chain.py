@@ -1,8 +1,8 @@
 """Follow points by dense flow anchored to the first frame; needs no weights.
 
 Each point rides on the dense warp of the surface around it (warp.py) and is then set to a fraction of a pixel by its
-own patch of the first frame (refine.py). Where the patch is not recognised, the warp alone carries it, and its sigma
-says so.
+own patch of the first frame (refine.py). Where the patch is not recognised, the warp alone carries it on from where it
+last was, and its sigma says so.
 """
 
 from collections.abc import Callable
@@ -38,10 +38,10 @@ def track(
     radius = int(np.clip(round(settings.patch * side), 4, 12))
     bright = hidden | np.stack([widen(mask, 1) for mask in specular])
     patches = templates(_grey(rgb[0]), queries, bright[0], radius=radius)
-    rows = [
-        _place(patches, warp, _grey(rgb[t]), bright[t], hidden[t])
-        for t, warp in enumerate(follow_surface(rgb, hidden, progress=progress))
-    ]
+    rows, shift = [], np.zeros(queries.shape)
+    for t, warp in enumerate(follow_surface(rgb, hidden, progress=progress)):
+        *row, shift = _place(patches, warp, _grey(rgb[t]), bright[t], hidden[t], shift)
+        rows.append(row)
     xy, visible, sigma = (np.stack(part, 1) for part in zip(*rows, strict=True))
     return Paths(xy.astype(np.float32), visible, sigma.astype(np.float32))
 
@@ -52,19 +52,26 @@ def widen(mask: np.ndarray, by: int) -> np.ndarray:
     return cv2.dilate(mask.astype(np.uint8), disc) > 0
 
 
-def _place(patches: Templates, warp: Warp, grey: np.ndarray, bright: np.ndarray, hidden: np.ndarray):
+def _place(
+    patches: Templates, warp: Warp, grey: np.ndarray, bright: np.ndarray, hidden: np.ndarray, last: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Where the points are, whether they are seen, how sure, and their shifts against the warp, (K, 2) [px].
+
+    last: their shifts in the frame before: what a warp has wrong in a place it has wrong in the next frame, too.
+    """
     found = find(patches, grey, warp.position, bright)
     error = sample(warp.error, patches.queries[:, None])[:, 0]
     seen = sample(warp.seen.astype(np.float32), patches.queries[:, None])[:, 0] > 0.5
     far = np.linalg.norm(found.shift, axis=-1)
     known = (found.likeness > LIKE) & (found.sigma < 1.0) & (far < 1.0 + 3.0 * error)
-    at = patches.queries + np.where(known[:, None], found.shift, 0.0)
+    shift = np.where(known[:, None], found.shift, last)
+    at = patches.queries + shift
     xy = sample(warp.position, at[:, None])[:, 0]
     height, width = hidden.shape
     inside = (xy >= 0).all(-1) & (xy[:, 0] <= width - 1) & (xy[:, 1] <= height - 1)
     covered = sample(hidden.astype(np.float32), xy[:, None])[:, 0] > 0.25
     visible = (known | (seen & (found.likeness > STRANGE))) & inside & ~covered
-    return xy, visible, np.maximum(np.where(known, found.sigma, error), 0.03)
+    return xy, visible, np.maximum(np.where(known, found.sigma, error), 0.03), shift
 
 
 def _grey(rgb: np.ndarray) -> np.ndarray:
