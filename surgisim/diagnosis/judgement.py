@@ -159,7 +159,7 @@ def judged(
 
     over: what is named gains over a placebo in the frames held out; worse: whether the error there rises with it.
     """
-    chances = probabilities(laws, tried)
+    chances = probabilities(laws, tried, calibration.GUESSED if case.clip.recording.doubts else calibration.MISFIT)
     chosen = simplest(case, stands(tried), tried, chances)
     fitted, term = chosen.fitted, chosen.first.term
     total = max(explainable(case.smooth), fitted.gain, 1e-9)
@@ -284,10 +284,13 @@ def nothing(case: Case, laws: Scores, borne: float | None = None) -> Judgement:
     return Judgement("nothing detectable", "faint", None, chances, 0.0, plain, noise_beside(case, plain), borne)
 
 
-def probabilities(laws: Scores, tried: list[Explanation]) -> dict[str, float]:
-    """Law -> probability; what is missing to 1 is nothing, or a law that nobody thought of."""
+def probabilities(laws: Scores, tried: list[Explanation], misfit: float = calibration.MISFIT) -> dict[str, float]:
+    """Law -> probability; what is missing to 1 is nothing, or a law that nobody thought of.
+
+    misfit: share of the explained chi square that signatures of the right law leave wrong.
+    """
     best = max(e.fitted.gain for e in tried)
-    heat = calibration.temperature(calibration.TEMPERATURE, best)
+    heat = calibration.temperature(calibration.TEMPERATURE, best, misfit)
     logs = {term: score.evidence for term, score in laws.items()}
     run: dict[str, float] = {}
     for e in tried:
