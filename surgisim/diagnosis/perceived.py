@@ -46,11 +46,11 @@ BY_VIDEO = ("perception", "shape", "swing", *OF_TRACKS)
 
 def groups(clip: Clip, simulated: np.ndarray, noise: Noise) -> list[Group]:
     """All of them; simulated: displacement of the points by the base [m], (K, T, 3)."""
-    body = [perceived(clip), shape(clip, simulated, noise), swing(clip, simulated, noise)]
+    body = [doubted(clip), shape(clip, simulated, noise), swing(clip, simulated, noise)]
     return [*body, astray(clip, noise), jumps(clip, noise)]
 
 
-def perceived(clip: Clip) -> Group:
+def doubted(clip: Clip) -> Group:
     """What the body and the grips were taken to be, as far as the recording says how sure of that it is."""
     doubts = clip.recording.of(clip.kept).doubts
     columns = np.stack(list(doubts.values())) if doubts else np.zeros((0, *clip.moved.shape))

@@ -10,7 +10,7 @@ from planted import plain
 from scipy.stats import chi2
 
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis import diagnose, nuisance
+from surgisim.diagnosis import diagnose, nuisance, perceived
 from surgisim.diagnosis.base import SPREAD, Known, carried, displacement_gradient, tracks_of
 from surgisim.diagnosis.diagnose import whitened
 from surgisim.diagnosis.errors import as_filmed, rms
@@ -260,9 +260,9 @@ def test_what_perception_left_open_is_no_misfit(case):
     away = np.linalg.norm(clip.recording.place - clip.motion.center_rest[0], axis=1)
     deeper = 2e-3 * np.exp(-0.5 * (away / 0.01) ** 2)[:, None, None] * course * [0.6, 0.0, 0.8]
     told = replace(clip, recording=replace(clip.recording, doubts={"held.depth": deeper}))
-    group = nuisance.perceived(told)
+    group = perceived.doubted(told)
     assert group.values == (("held.depth", 1.0, "standard deviations"),)
-    assert not len(nuisance.perceived(clip).columns)
+    assert not len(perceived.doubted(clip).columns)
     white = case.whiten(deeper[clip.kept][:, :until])[:, None]
     found = {}
     for name, groups in (("told", [*case.groups, group]), ("not", case.groups)):

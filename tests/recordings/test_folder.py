@@ -154,6 +154,7 @@ JSON = [
     ({"tier": None}, "'tier' is None"),
     ({"starts": "falling"}, "'starts' is 'falling'"),
     ({"doubts": "depth"}, "'doubts' is 'depth', but a list of names is wanted"),
+    ({"astray": -0.1}, "'astray' is -0.1, but a share of how far points go is wanted"),
     ({"doubts": ["depth"]}, "'doubts' has 1 names, and tracks.npz has doubts of 0 things"),
 ]
 
