@@ -234,7 +234,7 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
 
 
 def _unfit(case: Case, fitted: Joint, noise: Noise) -> bool:
-    """Whether frames held out are farther off than a recording is beside what it holds, the camera's drift aside."""
+    """Whether frames held out are farther off than a recording is beside what it holds, camera and video aside."""
     left = rms(case, as_filmed(case, fitted.moved))[1]
     return left is not None and left > calibration.UNFIT * noise_floor(noise)
 
@@ -356,7 +356,7 @@ def noise_beside(case: Case, after: np.ndarray) -> Noise:
 
 
 def borne_out(case: Case, after: np.ndarray) -> float:
-    """How much of what a prediction changes the plain error of the fitted frames bears out, the camera's drift aside.
+    """How much of what a prediction changes the plain error of the fitted frames bears out, camera and video aside.
 
     By how much its mean square falls, over that of the change: 1 where what is added is there (more where it is there
     more strongly), -1 where nothing of the kind is, whatever noise and camera are taken to do in directions that they
