@@ -81,6 +81,11 @@ class Noise:
         """d_k a_k of each point's surest axis [m], (K,)."""
         return self.scale.min(1)
 
+    @property
+    def each(self) -> np.ndarray:
+        """RMS error of each point along its surest axis in frames that are still [m], (K,)."""
+        return self.sigma * self.surest / np.sqrt((self.level**2).mean())
+
     def of(self, mine: np.ndarray) -> "Noise":
         """That of some of the points, as (M,) or (K,) bool chooses them."""
         parts = {name: value[mine] for name in ("level", "axes", "ways") if (value := getattr(self, name)) is not None}

@@ -143,7 +143,7 @@ def places(clip: Clip, gradient: np.ndarray, noise: Noise) -> Group:
 
     gradient: displacement's at the points [1], (3, K, T, 3).
     """
-    sigma = noise.sigma * noise.surest / np.sqrt((noise.level**2).mean())
+    sigma = noise.each
     found = []
     for k, slope in enumerate(np.moveaxis(gradient, 1, 0)):
         seen = slope[:, clip.seen[k]].reshape(3, -1)

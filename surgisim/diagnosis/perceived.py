@@ -149,7 +149,7 @@ def _fields(clip: Clip, far: np.ndarray, courses: np.ndarray, noise: Noise) -> n
     value, vector = np.linalg.eigh(far[:, None] * kernel * far)
     modes = vector * np.sqrt(np.maximum(value, 0.0))
     ways, each = np.stack(_ways(clip)), []
-    sigma = noise.sigma * noise.surest / np.sqrt((noise.level**2).mean())
+    sigma = noise.each
     weight = clip.seen[:, : clip.until] / sigma[:, None] ** 2
     worth = np.einsum("kq,nt,kt->nq", modes**2, courses[:, : clip.until] ** 2, weight)
     order = np.argsort(worth, axis=None)[::-1][: MOST // len(ways)]
@@ -169,6 +169,6 @@ def _ways(clip: Clip) -> list[np.ndarray]:
 
 def _worth(column: np.ndarray, clip: Clip, noise: Noise) -> np.ndarray:
     """Chi square of a direction [m], (..., K, T, 3), in the fitted frames, by point, (..., K)."""
-    sigma = noise.sigma * noise.surest / np.sqrt((noise.level**2).mean())
+    sigma = noise.each
     until = clip.until
     return ((column[..., :until, :] ** 2).sum(-1) * clip.seen[:, :until]).sum(-1) / sigma**2
