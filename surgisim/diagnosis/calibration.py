@@ -32,6 +32,13 @@ MISFIT = 0.05
 GUESSED = 0.1
 """The same where body and grips were read off a video; chosen: such a body goes about a quarter wrong in a hold (23 and
 28 %, medians of families 31415 and 16180), and so does what a law makes of it."""
+HALF = 0.5
+"""Of a video, whose body is guessed: share of what a smooth field could explain that a law must take off to say
+anything, and of what one could take off the frames held out. On boards 57721 and 90125 laws that are there and come
+first take off .59 to .92 and .85 to .92; the best ones where nothing is hidden .02 and .26, a wrong one that was named
+.06 and .09."""
+TWICE = 2.0
+"""Of a video: how many times more probable a law must be than any that moves the tissue otherwise; chosen."""
 UNFIT = 2.0
 """Times the noise by which frames held out may be off beside what is named, the camera's drift aside, which was not
 taken off when this was read: on the opened boards 22112611 and 22112612

@@ -92,6 +92,18 @@ def errors(case, before, after, placebo, noise: Noise) -> tuple[dict, dict]:
     return result[0], result[1]
 
 
+def taken_off(case, simulated: np.ndarray, noise: Noise) -> float | None:
+    """Share of what a smooth field could take off the held-out mean square that a prediction takes off; None where
+    frames held out are off by no more than noise."""
+    clip, until = case.clip, case.clip.until
+    before, after = rms(case, case.base.simulated)[1], rms(case, simulated)[1]
+    if before is None or before <= noise_floor(noise):
+        return None
+    seen, left = clip.seen[:, until:], residual(case, case.base.simulated, False)[:, until:]
+    least = 1e6 * float(((left - smooth_part(clip, left, seen))[seen] ** 2).sum(-1).mean())
+    return (before**2 - after**2) / max(before**2 - least, 1e-12)
+
+
 def bootstrap(case, before, after, draws: int = 200) -> tuple[float | None, float | None]:
     """90 % interval of what the law takes off the held-out mean square [mm^2], points drawn again.
 

@@ -14,7 +14,7 @@ from scipy.special import expit
 from surgisim.diagnosis import calibration, candidates
 from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.context import Case
-from surgisim.diagnosis.errors import as_filmed, bootstrap, noise_floor, residual, rms
+from surgisim.diagnosis.errors import as_filmed, bootstrap, noise_floor, residual, rms, taken_off
 from surgisim.diagnosis.evidence import Scores, best
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint, least, prediction
@@ -149,6 +149,9 @@ def _judged_ahead(case: Case, fitted: Joint) -> Explanation:
     out = max((out for out, _ in pushes(case.clip.recording, fitted.refits)), default=None)
     low, high = bootstrap(case, case.base.simulated, fitted.moved)
     falls, rises = low is not None and low > 0, high is not None and high < 0
+    if guessed(case):
+        # A guessed body is off by as much as noise everywhere: only beyond that a rise says something.
+        rises = rises and rms(case, fitted.moved)[1] > noise_floor(case.noise)
     return Explanation(fitted, fitted.refits[0].log_evidence, ahead, still(case, fitted.moved), out, falls, rises)
 
 
@@ -159,16 +162,21 @@ def judged(
 
     over: what is named gains over a placebo in the frames held out; worse: whether the error there rises with it.
     """
-    chances = probabilities(laws, tried, calibration.GUESSED if case.clip.recording.doubts else calibration.MISFIT)
+    chances = probabilities(laws, tried, calibration.GUESSED if guessed(case) else calibration.MISFIT)
     chosen = simplest(case, stands(tried), tried, chances)
     fitted, term = chosen.fitted, chosen.first.term
     total = max(explainable(case.smooth), fitted.gain, 1e-9)
     explained = float(np.clip(fitted.gain / total, 0, 1))
     noise = noise_beside(case, fitted.moved)
     borne = borne_out(case, fitted.moved)
-    others = instead(chosen, tried, chances)
+    others = alike(case, chosen, tried, chances) if guessed(case) else instead(chosen, tried, chances)
     held = chances[term] + sum(chances[r.term] for r in others)
-    reason = _reason(case, chosen, held, explained, borne, _unfit(case, fitted, noise), over)
+    if guessed(case):
+        rivals = (c for t, c in chances.items() if t != term and t not in {r.term for r in others})
+        ahead = held > calibration.TWICE * max(rivals, default=0.0)
+        reason = _reason_guessed(case, chosen, ahead, borne, taken_off(case, fitted.moved, noise), over)
+    else:
+        reason = _reason(case, chosen, held, explained, borne, _unfit(case, fitted, noise), over)
     if worse and reason == "named":
         reason = "refuted"
     if reason == "faint":
@@ -197,6 +205,15 @@ def stands(tried: list[Explanation]) -> Explanation:
         if each.sound and (n == 0 or each.confirmed):
             return each
     return tried[0]
+
+
+def alike(case: Case, chosen: Explanation, tried: list[Explanation], chances: dict[str, float]) -> tuple[Refit, ...]:
+    """What a single law of a video may be instead: others that move a guessed body nearly as it does."""
+    if len(chosen.fitted.refits) > 1:
+        return ()
+    rivals = [e.first for e in tried if e.first.term != chosen.first.term and len(e.fitted.refits) == 1 and e.sound]
+    near = [r for r in rivals if cos(case, chosen.first, r) > calibration.ALIKE]
+    return tuple(sorted(near, key=lambda r: -chances[r.term]))
 
 
 def instead(chosen: Explanation, tried: list[Explanation], chances: dict[str, float]) -> tuple[Refit, ...]:
@@ -270,6 +287,36 @@ def _reason(
     if over is not None and over.refuted:
         return "beaten"
     return "named"
+
+
+def guessed(case: Case) -> bool:
+    """Whether body and grips were read off a video."""
+    return bool(case.clip.recording.doubts)
+
+
+def _reason_guessed(
+    case: Case, chosen: Explanation, ahead: bool, borne: float, later: float | None, over: Gain | None
+) -> str:
+    """The same of a video; ahead: whether it, with what it may be instead, is far more probable than any other law;
+    later: what errors.taken_off says of it.
+
+    What a guessed body gets wrong is larger than noise and told from it; a law explains little of it, and nothing is
+    said then. One that is there takes most of the misfit away, also in frames held out, but not all of it.
+    """
+    free = not case.settings.calibrated
+    certain = free or chosen.log_evidence >= calibration.CLEAR
+    if not (certain and chosen.enough and 1 - chosen.left >= calibration.HALF):
+        return "faint"
+    doubts = {
+        "loose": chosen.loose,
+        "drawn": chosen.drawn,
+        "refuted": chosen.refuted,
+        "unfit": later is not None and later < calibration.HALF,
+        "unbacked": later is None and not free and borne < calibration.BORNE_OUT,
+        "unconfirmed": not ahead,
+        "beaten": over is not None and over.refuted,
+    }
+    return next((reason for reason, holds in doubts.items() if holds), "named")
 
 
 def nothing(case: Case, laws: Scores, borne: float | None = None) -> Judgement:

@@ -21,6 +21,7 @@ from surgisim.diagnosis.judgement import (
     cos,
     explainable,
     explanations,
+    guessed,
     judged,
     nothing,
     pushes,
@@ -228,6 +229,8 @@ def _ranking(case, laws, ranked, refits, chances) -> list[dict]:
 
 def _words(case: Case, said_of: Judgement, refits, laws, z, held_out: dict) -> str:
     verdict, chosen = said_of.verdict, said_of.chosen
+    if verdict == "nothing detectable" and guessed(case):
+        return words.guessed(1e-3 * detectable(case, laws)[0]) + words.beside(told(case, said_of.after))
     if verdict == "nothing detectable":
         # What the camera did there is no misfit.
         before, noise = rms(case, as_filmed(case, said_of.after))[1], held_out["noise_floor"]

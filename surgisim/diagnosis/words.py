@@ -44,6 +44,15 @@ def instead(others: Sequence[tuple[str, float]]) -> str:
     return f" It may be {told} instead: this recording does not tell them apart."
 
 
+def guessed(above: float) -> str:
+    """Of a video, where no law says most of what is there."""
+    return (
+        "Simulation and recording differ by no more than noise, camera, discretisation and a body guessed from one "
+        "view explain: no law takes away half of what a smooth motion could. Effects above "
+        f"{1e3 * above:.2g} mm RMS would have been seen on a known body."
+    )
+
+
 def nothing(above: float, later: tuple[float, float] | None = None) -> str:
     """later: misfit and noise of the frames held out [mm], where the misfit stands out."""
     seen = f"Effects above {1e3 * above:.2g} mm RMS would mostly have been seen"

@@ -20,7 +20,7 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
-from surgisim.estimation.carrying import carrying, course
+from surgisim.estimation.carrying import OPENS, carrying, course
 from surgisim.estimation.damping import numerical_damping
 from surgisim.estimation.doubts import doubts, none, spreads
 from surgisim.estimation.finer import finely
@@ -60,6 +60,7 @@ from surgisim.estimation.starts import choose_start
 from surgisim.estimation.stated import by_phase
 from surgisim.estimation.support import EDGES, Support, open_depth
 from surgisim.estimation.trial import SAFETY, WORKERS, Trial
+from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
 from surgisim.physics.catalogue import choose, columns
 from surgisim.physics.place import Place
@@ -315,6 +316,8 @@ def _weighed(
 def _known(trial: Trial, solution: Solution, model: dict, phase: np.ndarray, settings: Estimation) -> dict:
     """What a solution tells of the tissue itself: what its grid gets wrong is taken off, and counts as not known."""
     x, measured = solution.x, (trial.observation.weight[..., 2] > 0).any()
+    opens = np.array([name.endswith(".release") for name in trial.wanted.names])
+    model = model | {"how jaws open": np.diag((OPENS * opens) ** 2)}
     if trial.laying:
         off, doubt = on_no_grid(trial, x)
         model = model | {
@@ -396,7 +399,6 @@ def _refined(
     chosen = [names.index(n) for n in settings.field if n in names and n in trial.wanted.names]
     if not settings.field_iterations or not chosen:
         return theta, None
-    path = trial.drive(values, frames=int(fitted[-1]) + 1, safety=SAFETY / 1.5)
     judge = fitted[2::4]
     train = np.setdiff1d(fitted, judge)
     shown = np.sort(np.random.default_rng(settings.seed).permutation(train)[: settings.image_frames])
@@ -407,6 +409,10 @@ def _refined(
     ends = [p for t in choose(prepared.terms).values() for p in t.params.values()]
     # What is simulated at another pace has its limits there as well.
     slower = np.exp([PACE.get(p.unit, 0.0) * eased for p in ends])
+
+    def path(theta: np.ndarray) -> Drive:
+        return trial.drive(values, frames=int(fitted[-1]) + 1, stiffest=prepared.stiffest(theta))
+
     refined = refine(
         prepared.simulator, path, theta, chosen, trial.observation, train=train, judge=judge, image=image,
         image_weight=settings.image_weight, iterations=settings.field_iterations, smoothness=settings.smoothness,

@@ -15,12 +15,18 @@ from scipy.spatial import cKDTree
 from surgisim.estimation.gauss_newton import WIDTH, misfit
 from surgisim.estimation.observation import Observation
 from surgisim.mpm.grip import Drive
-from surgisim.mpm.simulator import Breakdown, Simulator
+from surgisim.mpm.simulator import Breakdown, Run, Simulator
 
-RATE = 0.08
-"""Adam's step in the logarithm."""
+RATE, LEAST = 0.3, 0.02
+"""First step in the logarithm, root mean square, and the one below which none is tried any more."""
+LONGER, SHORTER = 1.2, 0.4
+"""Times the step after one that fits better, and after one that does not or cannot be simulated."""
+KEEPS = 0.6
+"""Share of the last direction in the next."""
+STAYS = 1.0
+"""How far around a place that broke tissue stays as it is, in grid cells."""
 PATIENCE = 3
-"""Steps in a row without a better fit of the kept frames after which no more are made."""
+"""Better fits in a row that do not fit the kept frames better after which no more are sought."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +39,25 @@ class Refined:
     history: list[dict]
 
 
+@dataclass(frozen=True)
+class _Tried:
+    """A field that was simulated."""
+
+    s: np.ndarray
+    theta: np.ndarray
+    drive: Drive
+    run: Run
+    track: float
+    image: float
+    judged: float
+    loss: float
+    u_bar: np.ndarray
+    """Derivative of the loss by the displacements, (T, A, 3)."""
+
+
 def refine(
     simulator: Simulator,
-    drive: Drive,
+    drive: Callable[[np.ndarray], Drive],
     theta: np.ndarray,
     columns: list[int],
     observation: Observation,
@@ -52,54 +74,84 @@ def refine(
 ) -> Refined:
     """Improve `columns` of theta (P, M) on frames `train`, and keep the best only if `judge` improves.
 
+    drive: what carries the tissue, at a step that is stable for a theta.
     image: from u (T, A, 3) to the image misfit and its derivative (T, A, 3), or None.
     limits: lowest and highest value of every column, (M,) each.
     """
     pairs = cKDTree(simulator.rest).query(simulator.rest, neighbours + 1)[1]
     own, other = np.repeat(pairs[:, 0], neighbours), pairs[:, 1:].ravel()
-    s = np.zeros((len(theta), len(columns)))
-    first, second = np.zeros_like(s), np.zeros_like(s)
-    best_s, best_judged, best_k, history = s, np.inf, 0, []
-    begun = np.inf
-    for k in range(iterations + 1):
-        now = theta.copy()
-        now[:, columns] = np.clip(theta[:, columns] * np.exp(s), limits[0][columns], limits[1][columns])
-        try:
-            run = simulator.run(now, drive)
-        except Breakdown:
-            # A field that cannot be simulated is no candidate; the best one so far stands.
-            break
-        judged = _track_loss(observation, run.u, judge)[0]
+
+    def field(s: np.ndarray) -> np.ndarray:
+        whole = theta.copy()
+        whole[:, columns] = np.clip(theta[:, columns] * np.exp(s), limits[0][columns], limits[1][columns])
+        return whole
+
+    def tried(s: np.ndarray) -> _Tried:
+        now = field(s)
+        path = drive(now)
+        run = simulator.run(now, path)
         track, u_bar = _track_loss(observation, run.u, train)
         picture = 0.0
         if image is not None and image_weight > 0:
             picture, picture_bar = image(run.u)
             u_bar = u_bar + image_weight * picture_bar
-        history.append({"iteration": k, "track": track, "image": picture, "judged": judged})
-        progress(k, iterations, f"refinement {k}/{iterations}, misfit {track:.3f}, on kept frames {judged:.3f}")
-        begun = judged if k == 0 else begun
-        if judged < best_judged:
-            best_s, best_judged, best_k = s.copy(), judged, k
-        if k == iterations or k - best_k >= PATIENCE:
-            break
-        gradient = simulator.gradient(now, drive, run, u_bar).theta[:, columns] * now[:, columns]
-        difference = s[own] - s[other]
-        smooth = np.zeros_like(s)
-        for c in range(s.shape[1]):
-            flow = 2 * smoothness * difference[:, c] / len(own)
-            smooth[:, c] = np.bincount(own, flow, len(s)) - np.bincount(other, flow, len(s))
-        gradient = gradient + smooth
+        rough = smoothness * float(((s[own] - s[other]) ** 2).sum()) / len(own)
+        judged = _track_loss(observation, run.u, judge)[0]
+        return _Tried(s, now, path, run, track, picture, judged, track + image_weight * picture + rough, u_bar)
+
+    def downhill(at: _Tried) -> np.ndarray:
+        """The direction of descent, root mean square 1."""
+        gradient = simulator.gradient(at.theta, at.drive, at.run, at.u_bar).theta[:, columns] * at.theta[:, columns]
+        difference = 2 * smoothness * (at.s[own] - at.s[other]) / len(own)
+        for c in range(at.s.shape[1]):
+            gradient[:, c] += np.bincount(own, difference[:, c], len(at.s))
+            gradient[:, c] -= np.bincount(other, difference[:, c], len(at.s))
         # Neighbours share their gradient, so that a step is as smooth as the field it makes.
         for _ in range(8):
             gradient = gradient[pairs].mean(1)
-        first = 0.8 * first + 0.2 * gradient
-        second = 0.9 * second + 0.1 * (gradient**2).mean(0)
-        s = s - RATE * (first / (1 - 0.8 ** (k + 1))) / (np.sqrt(second / (1 - 0.9 ** (k + 1))) + 1e-30)
-    kept = best_judged < begun * (1 - 0.01)
-    final = theta.copy()
-    if kept:
-        final[:, columns] = np.clip(theta[:, columns] * np.exp(best_s), limits[0][columns], limits[1][columns])
-    return Refined(final, bool(kept), history)
+        return -_even(gradient)
+
+    begun = at = best = tried(np.zeros((len(theta), len(columns))))
+    history = [_row(0, at)]
+    free = np.ones((len(theta), 1))
+    way = down = downhill(at)
+    rate, patience = RATE, PATIENCE
+    for k in range(1, iterations + 1):
+        said = f"refinement {k}/{iterations}, misfit {at.track:.3f}, on kept frames {at.judged:.3f}"
+        progress(k, iterations + 1, said)
+        try:
+            new = tried(at.s + rate * free * way)
+        except Breakdown as breakdown:
+            # A field that cannot be simulated is no candidate. Where it broke, tissue stays as it is from there on.
+            new = None
+            if breakdown.particle is not None:
+                away = np.linalg.norm(simulator.rest - simulator.rest[breakdown.particle], axis=1)
+                free *= 1 - np.exp(-((away / (STAYS * simulator.grid.spacing)) ** 2))[:, None]
+                continue
+        if new is None or new.loss >= at.loss:
+            # A shorter step, straight downhill.
+            way, rate = down, SHORTER * rate
+            if rate < LEAST:
+                break
+            continue
+        at = new
+        history.append(_row(k, at))
+        best, patience = (at, PATIENCE) if at.judged < best.judged else (best, patience - 1)
+        if not patience or k == iterations:
+            break
+        down = downhill(at)
+        way, rate = _even(KEEPS * way + down), LONGER * rate
+    kept = best.judged < begun.judged * (1 - 0.01)
+    return Refined(best.theta if kept else theta, bool(kept), history)
+
+
+def _even(way: np.ndarray) -> np.ndarray:
+    """A direction (P, M) over its root mean square: what hardly matters hardly changes."""
+    return way / (np.sqrt((way**2).mean()) + 1e-30)
+
+
+def _row(k: int, at: _Tried) -> dict:
+    return {"iteration": k, "track": at.track, "image": at.image, "judged": at.judged}
 
 
 def _track_loss(observation: Observation, u: np.ndarray, frames: np.ndarray):

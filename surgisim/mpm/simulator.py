@@ -42,6 +42,11 @@ def by_cell(device: str) -> bool:
 class Breakdown(Problem):
     """A run that cannot go on: inverted tissue or a number that is none, with step and place."""
 
+    def __init__(self, message: str, particle: int | None = None) -> None:
+        super().__init__(message)
+        self.particle = particle
+        """Which went wrong first, if it is known."""
+
 
 @dataclass(frozen=True)
 class Run:
@@ -395,7 +400,8 @@ class Simulator(Nodes):
         raise Breakdown(
             f"simulation: particle {particle} at rest position {where} m turned inside out (or stopped being a "
             f"number) at step {step} ({step * drive.step:.4f} s), where {law} pushed hardest. Its load is too violent "
-            "for this tissue or the step too large: take a smaller step, a gentler motion, or a stiffer tissue."
+            "for this tissue or the step too large: take a smaller step, a gentler motion, or a stiffer tissue.",
+            particle,
         )
 
 

@@ -192,3 +192,24 @@ def test_what_takes_nothing_off_and_frames_held_out_contradict_is_nothing_howeve
 def test_a_tie_with_a_placebo_is_no_defeat():
     assert [reason(explanation(), over=over) for over in (None, BETTER, ALIKE, BLIND)] == ["named"] * 4
     assert reason(explanation(), over=WORSE) == "beaten"
+
+
+@pytest.mark.parametrize(
+    ("chosen", "ahead", "borne", "later", "said"),
+    [
+        (explanation(left=0.3), True, 0.9, 0.9, "named"),
+        # A guessed body is off by more than noise: what explains little of that says nothing, however sure it looks.
+        (explanation(left=0.6), True, 0.9, 0.9, "faint"),
+        (explanation(evidence=CLEAR - 1), True, 0.9, 0.9, "faint"),
+        # Frames held out speak for it where they can, before what the fitted ones bear out.
+        (explanation(left=0.3), True, -1.0, 0.9, "named"),
+        (explanation(left=0.3), True, 0.9, 0.3, "unfit"),
+        (explanation(left=0.3), True, 0.9, None, "named"),
+        (explanation(left=0.3), True, -1.0, None, "unbacked"),
+        (explanation(left=0.3), False, 0.9, 0.9, "unconfirmed"),
+        (explanation(left=0.3, ahead=WORSE), True, 0.9, 0.9, "refuted"),
+        (explanation("hidden_contact", left=0.3, out=-0.8), True, 0.9, 0.9, "loose"),
+    ],
+)
+def test_a_law_that_a_video_shows_takes_most_of_the_misfit(chosen, ahead, borne, later, said):
+    assert judgement._reason_guessed(CASE, chosen, ahead, borne, later, None) == said
