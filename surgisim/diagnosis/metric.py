@@ -8,7 +8,10 @@ With whitened columns U scaled to their prior standard deviations, the covarianc
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+ROWS = 4096
+"""Rows that are taken to double precision at once."""
 
 
 @dataclass(frozen=True)
@@ -53,5 +56,11 @@ class Metric:
 def metric(columns: np.ndarray) -> Metric:
     """columns: whitened and scaled to one prior standard deviation, (N, M)."""
     U = np.ascontiguousarray(columns if columns.shape[1] else np.zeros((len(columns), 1)), np.float32)
-    normal = (U.T @ U).astype(float)
-    return Metric(U, cho_factor(np.eye(len(normal)) + normal))
+    one = np.eye(U.shape[1])
+    try:
+        factor = cho_factor(one + (U.T @ U).astype(float))
+    except LinAlgError:
+        # Columns so large and so alike that their products, rounded to single precision, are those of no columns.
+        rows = np.array_split(U, len(U) // ROWS + 1)
+        factor = cho_factor(one + sum(part.T.astype(float) @ part.astype(float) for part in rows))
+    return Metric(U, factor)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from planted import plain
+from scipy.linalg import cho_factor
 from scipy.stats import chi2
 
 from surgisim.config.diagnosis import Diagnosing
@@ -268,3 +269,13 @@ def test_what_perception_left_open_is_no_misfit(case):
     for name, groups in (("told", [*case.groups, group]), ("not", case.groups)):
         found[name] = metric(whitened(case.whiten, groups, until)).gram(white, white)[0, 0]
     assert found["told"] < 1.1 < 100 < found["not"]
+
+
+def test_directions_that_are_large_and_alike_are_told_in_double_precision():
+    one = np.random.default_rng(8).standard_normal((6000, 1))
+    apart = np.random.default_rng(9).standard_normal((6000, 20))
+    U = (3e4 * (one + 1e-6 * apart)).astype(np.float32)
+    with pytest.raises(np.linalg.LinAlgError):
+        cho_factor(np.eye(20) + (U.T @ U).astype(float))
+    exact = np.eye(20) + U.T.astype(float) @ U.astype(float)
+    assert metric(U).log_det == pytest.approx(np.linalg.slogdet(exact)[1], rel=1e-3)
