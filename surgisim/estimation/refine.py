@@ -17,10 +17,10 @@ from surgisim.estimation.observation import Observation
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.simulator import Breakdown, Run, Simulator
 
-RATE, LEAST = 0.3, 0.02
+RATE, LEAST = 0.3, 0.005
 """First step in the logarithm, root mean square, and the one below which none is tried any more."""
-LONGER, SHORTER = 1.2, 0.4
-"""Times the step after one that fits better, and after one that does not or cannot be simulated."""
+LONGER, SHORTER = 1.2, (0.05, 0.5)
+"""Times the step after one that fits better; after one that does not, between which, as a parabola has it."""
 KEEPS = 0.6
 """Share of the last direction in the next."""
 STAYS = 1.0
@@ -99,23 +99,24 @@ def refine(
         judged = _track_loss(observation, run.u, judge)[0]
         return _Tried(s, now, path, run, track, picture, judged, track + image_weight * picture + rough, u_bar)
 
-    def downhill(at: _Tried) -> np.ndarray:
-        """The direction of descent, root mean square 1."""
+    def downhill(at: _Tried) -> tuple[np.ndarray, np.ndarray]:
+        """The direction of descent, root mean square 1, and the loss's derivative by s, both (P, M)."""
         gradient = simulator.gradient(at.theta, at.drive, at.run, at.u_bar).theta[:, columns] * at.theta[:, columns]
         difference = 2 * smoothness * (at.s[own] - at.s[other]) / len(own)
         for c in range(at.s.shape[1]):
             gradient[:, c] += np.bincount(own, difference[:, c], len(at.s))
             gradient[:, c] -= np.bincount(other, difference[:, c], len(at.s))
         # Neighbours share their gradient, so that a step is as smooth as the field it makes.
+        smooth = gradient
         for _ in range(8):
-            gradient = gradient[pairs].mean(1)
-        return -_even(gradient)
+            smooth = smooth[pairs].mean(1)
+        return -_even(smooth), gradient
 
     begun = at = best = tried(np.zeros((len(theta), len(columns))))
     history = [_row(0, at)]
     free = np.ones((len(theta), 1))
-    way = down = downhill(at)
-    rate, patience = RATE, PATIENCE
+    down, slope = downhill(at)
+    way, rate, patience = down, RATE, PATIENCE
     for k in range(1, iterations + 1):
         said = f"refinement {k}/{iterations}, misfit {at.track:.3f}, on kept frames {at.judged:.3f}"
         progress(k, iterations + 1, said)
@@ -129,8 +130,11 @@ def refine(
                 free *= 1 - np.exp(-((away / (STAYS * simulator.grid.spacing)) ** 2))[:, None]
                 continue
         if new is None or new.loss >= at.loss:
-            # A shorter step, straight downhill.
-            way, rate = down, SHORTER * rate
+            # A shorter step, straight downhill from then on.
+            rate *= (
+                SHORTER[1] if new is None else _shorter(rate * float((slope * free * way).sum()), new.loss - at.loss)
+            )
+            way = down
             if rate < LEAST:
                 break
             continue
@@ -139,7 +143,7 @@ def refine(
         best, patience = (at, PATIENCE) if at.judged < best.judged else (best, patience - 1)
         if not patience or k == iterations:
             break
-        down = downhill(at)
+        down, slope = downhill(at)
         way, rate = _even(KEEPS * way + down), LONGER * rate
     kept = best.judged < begun.judged * (1 - 0.01)
     return Refined(best.theta if kept else theta, bool(kept), history)
@@ -148,6 +152,13 @@ def refine(
 def _even(way: np.ndarray) -> np.ndarray:
     """A direction (P, M) over its root mean square: what hardly matters hardly changes."""
     return way / (np.sqrt((way**2).mean()) + 1e-30)
+
+
+def _shorter(begins: float, ended: float) -> float:
+    """Share of a step at which a parabola is lowest: `begins` is the change of the loss that the slope at its begin
+    promises for the whole step, `ended` the one it made."""
+    low, high = SHORTER
+    return min(max(-begins / (2 * (ended - begins)), low), high) if begins < 0 else high
 
 
 def _row(k: int, at: _Tried) -> dict:
