@@ -82,8 +82,7 @@ def errors(case, before, after, placebo, noise: Noise) -> tuple[dict, dict]:
         if not seen.any():
             parts.append(None)
             continue
-        smooth = smooth_part(clip, left[:, span], seen)
-        parts.append(1e3 * float(np.sqrt(((left[:, span] - smooth)[seen] ** 2).sum(-1).mean())))
+        parts.append(_beside_smooth(clip, left[:, span], seen))
     result = []
     for k in (0, 1):
         result.append({"noise_floor": floor, **{n: r[k] for n, r in rows.items()}, "flexible": parts[k], "unit": "mm"})
@@ -100,8 +99,13 @@ def taken_off(case, simulated: np.ndarray, noise: Noise) -> float | None:
     if before is None or before <= noise_floor(noise):
         return None
     seen, left = clip.seen[:, until:], residual(case, case.base.simulated, False)[:, until:]
-    least = 1e6 * float(((left - smooth_part(clip, left, seen))[seen] ** 2).sum(-1).mean())
-    return (before**2 - after**2) / max(before**2 - least, 1e-12)
+    least = _beside_smooth(clip, left, seen)
+    return (before**2 - after**2) / max(before**2 - least**2, 1e-12)
+
+
+def _beside_smooth(clip, left: np.ndarray, seen: np.ndarray) -> float:
+    """RMS [mm] of what a smooth field leaves of a residual [m], (K, F, 3), in samples `seen`, (K, F)."""
+    return 1e3 * float(np.sqrt(((left - smooth_part(clip, left, seen))[seen] ** 2).sum(-1).mean()))
 
 
 def bootstrap(case, before, after, draws: int = 200) -> tuple[float | None, float | None]:

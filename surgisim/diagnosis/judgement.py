@@ -211,9 +211,13 @@ def alike(case: Case, chosen: Explanation, tried: list[Explanation], chances: di
     """What a single law of a video may be instead: others that move a guessed body nearly as it does."""
     if len(chosen.fitted.refits) > 1:
         return ()
-    rivals = [e.first for e in tried if e.first.term != chosen.first.term and len(e.fitted.refits) == 1 and e.sound]
-    near = [r for r in rivals if cos(case, chosen.first, r) > calibration.ALIKE]
+    near = [r for r in _rivals(chosen, tried) if cos(case, chosen.first, r) > calibration.ALIKE]
     return tuple(sorted(near, key=lambda r: -chances[r.term]))
+
+
+def _rivals(chosen: Explanation, tried: list[Explanation]) -> list[Refit]:
+    """Single laws of another name that nothing speaks against."""
+    return [e.first for e in tried if e.first.term != chosen.first.term and len(e.fitted.refits) == 1 and e.sound]
 
 
 def instead(chosen: Explanation, tried: list[Explanation], chances: dict[str, float]) -> tuple[Refit, ...]:
@@ -225,8 +229,7 @@ def instead(chosen: Explanation, tried: list[Explanation], chances: dict[str, fl
     if len(chosen.fitted.refits) > 1:
         return ()
     least, held, found = 1 - calibration.CREDIBLE, chances[chosen.first.term], []
-    rivals = [e.first for e in tried if e.first.term != chosen.first.term and len(e.fitted.refits) == 1 and e.sound]
-    for law in sorted(rivals, key=lambda r: -chances[r.term]):
+    for law in sorted(_rivals(chosen, tried), key=lambda r: -chances[r.term]):
         if held > calibration.CREDIBLE or chances[law.term] < least:
             break
         found.append(law)

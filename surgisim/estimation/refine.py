@@ -18,7 +18,8 @@ from surgisim.mpm.grip import Drive
 from surgisim.mpm.simulator import Breakdown, Run, Simulator
 
 RATE, LEAST = 0.3, 0.005
-"""First step in the logarithm, root mean square, and the one below which none is tried any more."""
+"""First step in the logarithm, root mean square, and the one below which none is tried any more; chosen,
+as what follows."""
 LONGER, SHORTER = 1.2, (0.05, 0.5)
 """Times the step after one that fits better; after one that does not, between which, as a parabola has it."""
 KEEPS = 0.6
