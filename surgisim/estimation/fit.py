@@ -50,6 +50,7 @@ from surgisim.estimation.rounds import (
     at_ease,
     choose_support,
     descend,
+    handed_on,
     number,
     settle_grip,
     settle_pull,
@@ -197,7 +198,7 @@ def estimate(
         field, refined = _refined(coarse, uniform, wide.eased or 0.0, scene, frames, masks, camera, settings, progress)
         theta = _brought(field, coarse, uniform, trial, values)
     x = x[: len(wanted.free)]
-    trial, run = settle_grip(trial, x, history, theta)
+    trial, run = handed_on(trial, x, theta, history)
     prepared, laid = trial.bodies[0], trial.bodies[0].body
     path = trial.drive(values, stiffest=prepared.stiffest(theta))
     after = {name: trial.observation.error(run.u, at) for name, at in parts.items()}

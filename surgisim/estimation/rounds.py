@@ -20,6 +20,7 @@ from surgisim.estimation.rim import Rim
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import MIDDLE, SHARES, edges_of
 from surgisim.estimation.trial import WORKERS, Trial, at_once
+from surgisim.mpm.carried import Carried
 from surgisim.mpm.grip import runs
 from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.mpm.stable import shear_speed
@@ -34,6 +35,13 @@ NEARER = (0.0, -1.0, 1.0)
 """How much farther off than expected the grip ends there, in spreads of its prior."""
 GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
 """How firmly instruments may hold, tried in turn."""
+SQUEEZED, YIELDS = 0.05, 0.8
+"""Least share of its volume to which what is handed on may be squeezed, and how much softer than the last each grip is
+that is tried so that it holds; chosen."""
+TOO_VIOLENT = (
+    "estimation: the body turns inside out under the recorded motion however softly it is held. Check the grip and its "
+    "path (tracking), or give it (--grasp)."
+)
 INERTIA = 0.005
 """Share of what a pull moves the tissue by that it may lag for its inertia, where its shape alone is asked for: at .02
 a slab held 15 mm deep is found held 13.3 mm deep, at .005 14.5 mm, at the pace of its own modulus 14.7 mm."""
@@ -97,27 +105,41 @@ def at_ease(trial: Trial) -> Trial:
     return replace(trial, eased=-hurried)
 
 
-def settle_grip(trial: Trial, x: np.ndarray, history: list, theta=None) -> tuple[Trial, Run]:
+def settle_grip(trial: Trial, x: np.ndarray, history: list) -> tuple[Trial, Run]:
     """The trial with the firmest grip, not firmer than its own, under which the whole clip can be simulated at x.
 
     Tracks at the jaws are the worst there are, and a firm grip that follows them can turn the tissue inside
-    out; a softer one lets it slip. theta: per-particle parameters, (P, M), of a settled trial; uniform if None. Raises
-    Problem when even the softest does not help.
+    out; a softer one lets it slip. Raises Problem when even the softest does not help.
     """
-    values = trial.wanted.values(x)
     for share in [g for g in GRIPS if g <= trial.grip]:
         softer = replace(trial, grip=share)
         try:
-            if theta is None:
-                return softer, softer.run(x)
-            body = softer.bodies[0]
-            return softer, body.simulator.run(theta, softer.drive(values, stiffest=body.stiffest(theta)))
+            return softer, softer.run(x)
         except Breakdown as breakdown:
             history.append({"round": "grip", "share": share, "cost": None, "broke": str(breakdown)})
-    raise Problem(
-        "estimation: the body turns inside out under the recorded motion however softly it is held. Check the "
-        "grip and its path (tracking), or give it (--grasp)."
-    )
+    raise Problem(TOO_VIOLENT)
+
+
+def handed_on(trial: Trial, x: np.ndarray, theta: np.ndarray, history: list) -> tuple[Trial, Run]:
+    """The settled trial with the firmest grip under which its body, theta (P, M), bears the whole clip with a margin.
+
+    Where tissue is all but inside out, rounding decides whether a replay of it breaks. Raises Problem when even the
+    softest grip does not help.
+    """
+    values, body = trial.wanted.values(x), trial.bodies[0]
+    particles = Carried(body.body.rest, body.simulator)
+    while trial.grip >= GRIPS[-1]:
+        try:
+            run = body.simulator.run(theta, trial.drive(values, stiffest=body.stiffest(theta)))
+            least = min(float(np.linalg.det(particles.at(u)[1]).min()) for u in run.u)
+            if least >= SQUEEZED:
+                return trial, run
+            broke = f"tissue is squeezed to {least:.3f} of its volume"
+        except Breakdown as breakdown:
+            broke = str(breakdown)
+        history.append({"round": "grip", "share": trial.grip, "cost": None, "broke": broke})
+        trial = replace(trial, grip=YIELDS * trial.grip)
+    raise Problem(TOO_VIOLENT)
 
 
 def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> tuple[list[Trial], np.ndarray]:

@@ -15,8 +15,9 @@ from surgisim.lighting.highlights import LOBES, share_left, without
 from surgisim.lighting.normals import at_pixels, rest_normals, turned
 from surgisim.lighting.recorded import beside, shown
 from surgisim.lighting.strength import Strength, fit_strength, mildest
+from surgisim.mpm.carried import Carried
 from surgisim.mpm.nodes import Nodes
-from surgisim.simulation.draw import Carried, Shade
+from surgisim.simulation.draw import Shade
 
 AMBIENT = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
 """Ambient shares to choose from; 1 leaves the fall over distance alone [1]."""

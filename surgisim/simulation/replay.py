@@ -16,12 +16,13 @@ from surgisim.artifacts.replay import Replay
 from surgisim.artifacts.scene import Scene
 from surgisim.config.simulation import Simulation
 from surgisim.gaussians.rim import beyond
+from surgisim.mpm.carried import Carried
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import SKIN, Prepared, checked_per_frame, prepare, theta_of, values_of
 from surgisim.mpm.simulator import Run, Simulator
 from surgisim.physics.catalogue import choose, defaults
 from surgisim.problem import Problem
-from surgisim.simulation.draw import Carried, Drawn
+from surgisim.simulation.draw import Drawn
 from surgisim.simulation.operation import Plan, plan
 from surgisim.simulation.relight import Light, find_light
 

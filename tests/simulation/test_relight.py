@@ -13,8 +13,9 @@ from surgisim.artifacts.scene import Scene
 from surgisim.gaussians.rim import beyond
 from surgisim.lighting.highlights import without
 from surgisim.lighting.strength import Strength
+from surgisim.mpm.carried import Carried
 from surgisim.mpm.setup import SKIN, prepare
-from surgisim.simulation.draw import Carried, Drawn
+from surgisim.simulation.draw import Drawn
 from surgisim.simulation.relight import Light, find_light
 
 FRAMES = 14
