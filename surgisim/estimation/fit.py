@@ -126,10 +126,11 @@ def estimate(
     carried = np.concatenate([scene.mean, tracked]).astype(float)
 
     def make(
-        body: Body, motion: Motion, terms: tuple[str, ...] = tuple(settings.terms), carried: np.ndarray = carried
-    ) -> Prepared:
+        body: Body, motion: Motion, terms: tuple[str, ...] = tuple(settings.terms), carried: np.ndarray = carried,
+        threads: int = 1,
+    ) -> Prepared:  # fmt: skip
         return prepare(
-            body, terms, density=settings.density, gravity=settings.gravity, carried=carried,
+            body, terms, density=settings.density, gravity=settings.gravity, carried=carried, threads=threads,
             device=settings.device, form=settings.form, places=places, grips=motion, skin=SKIN,
         )  # fmt: skip
 
@@ -195,7 +196,11 @@ def estimate(
     theta, refined = trial.theta(values), None
     if settings.enabled:
         # A field shapes what is slow, which the wider grid shows as well, at a fifth of the cost.
-        field, refined = _refined(coarse, uniform, wide.eased or 0.0, scene, frames, masks, camera, settings, progress)
+        alone = make(coarse.bodies[0].body, coarse.motion, threads=WORKERS)
+        field, refined = _refined(
+            replace(coarse, bodies=[alone]), uniform, wide.eased or 0.0, scene, frames, masks, camera, settings,
+            progress,
+        )  # fmt: skip
         theta = _brought(field, coarse, uniform, trial, values)
     x = x[: len(wanted.free)]
     trial, run = handed_on(trial, x, theta, history)

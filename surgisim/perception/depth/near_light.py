@@ -116,10 +116,11 @@ def _watch(lattice: Lattice, position: np.ndarray, sure: np.ndarray, now) -> tup
 
 def _look(lattice, position, sure, now, alone, rest, albedo, origin, focal) -> _Look:
     light, _, known = now
-    origin, weight = _inverse(position, sure, origin, lattice)
+    origin, found = _inverse(position, origin, lattice)
+    weight = found * _at(sure, origin)
     # Tissue that frame 0 did not show has the shape that this frame alone suggests, fitted to what is known around it.
-    surely = weight.max() > 0.1
-    start = alone + (spread(_at(rest, origin) - alone, weight) if surely else np.median(rest) - np.median(alone))
+    surely = found.max() > 0.1
+    start = alone + (spread(_at(rest, origin) - alone, found) if surely else np.median(rest) - np.median(alone))
     moved = spread(np.linalg.norm(origin - lattice.pixels, axis=-1), weight) / focal
     moved = cv2.GaussianBlur(moved.astype(np.float32), (0, 0), 1.5).astype(float)
     weight = weight * known
@@ -192,15 +193,15 @@ def _plane(lattice: Lattice, log_z: np.ndarray) -> np.ndarray:
     return plane - np.median(plane)
 
 
-def _inverse(position: np.ndarray, seen: np.ndarray, start: np.ndarray, lattice: Lattice):
-    """Where in frame 0 each pixel came from (h, w, 2) [lattice px], and how surely, 0-1 (h, w)."""
+def _inverse(position: np.ndarray, start: np.ndarray, lattice: Lattice):
+    """Where in frame 0 each pixel came from (h, w, 2) [lattice px], and whether it did, 0-1 (h, w)."""
     grid, origin = lattice.pixels, start
     for _ in range(15):
         origin = origin + 0.7 * (grid - _at(position, origin))
     miss = np.linalg.norm(_at(position, origin) - grid, axis=-1)
     high, wide = lattice.shape
     inside = (origin > -1).all(-1) & (origin[..., 0] < wide) & (origin[..., 1] < high)
-    good = np.exp(-((miss / 0.5) ** 2)) * inside * _at(seen.astype(np.float32), origin)
+    good = np.exp(-((miss / 0.5) ** 2)) * inside
     return np.where(np.isfinite(origin), origin, grid).astype(np.float32), good
 
 
