@@ -249,7 +249,9 @@ def settle_pull(
     heats = [(len(trials), HEATS[0]), (FINALISTS, HEATS[1])][len(trials) < 2 :]
     work, done = sum(entrants * iterations for entrants, iterations in heats), 0
 
-    def settled(trial: Trial, begin: np.ndarray, iterations: int) -> tuple[float, Trial, np.ndarray]:
+    def settled(
+        trial: Trial, begin: np.ndarray, iterations: int, jacobian: np.ndarray | None
+    ) -> tuple[float, Trial, np.ndarray, np.ndarray | None]:
         def said(iteration: int, y: np.ndarray, cost: float) -> None:
             values = {n: float(f"{v:.4g}") for n, v in plain(wanted, whole(y)).items()}
             edge = {"beyond": trial.laying.margin, "rim": trial.laying.rim} if trial.laying else {}
@@ -262,22 +264,24 @@ def settle_pull(
                 lambda y, worker: trial.residual(whole(y), worker, last), begin[slow], prior=wanted.start[slow],
                 spread=wanted.spread[slow], differences=trial.differences[slow], bounds=(low[slow], high[slow]),
                 share=INDEPENDENT, iterations=iterations, workers=WORKERS, said=said, renewed=False,
-                together=lambda ys: trial.together([whole(y) for y in ys], last),
+                together=lambda ys: trial.together([whole(y) for y in ys], last), jacobian=jacobian,
             )  # fmt: skip
         except Breakdown as breakdown:
             history.append({"round": "pull", "last_frame": last, "cost": None, "broke": str(breakdown)})
-            return np.inf, trial, begin
+            return np.inf, trial, begin, jacobian
         there = whole(found.x)
-        return cost_of(found.residual, there, wanted), trial, there
+        return cost_of(found.residual, there, wanted), trial, there, found.jacobian
 
-    field = [(0.0, trial, x) for trial in trials]
+    field: list[tuple[float, Trial, np.ndarray, np.ndarray | None]] = [(0.0, trial, x, None) for trial in trials]
     for entrants, iterations in heats:
-        run = []
-        for _, trial, begin in field[:entrants]:
-            run.append(settled(trial, begin, iterations))
+        run, shared = [], None
+        for _, trial, begin, own in field[:entrants]:
+            # Another edge bends how the pull's shape answers a little, which the steps correct.
+            run.append(settled(trial, begin, iterations, shared if own is None else own))
+            shared = run[-1][-1] if shared is None else shared
             done += iterations
         field = sorted(run, key=lambda one: one[0])
-    return field[0][1:]
+    return field[0][1:3]
 
 
 def descend(

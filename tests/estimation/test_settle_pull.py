@@ -54,3 +54,22 @@ def test_one_that_cannot_be_simulated_is_left_out():
     broken.residual = broken.together = breaks
     trial, _ = settle_pull([broken, right], WANTED.start, PHASE, [], lambda *_: None)
     assert trial is right
+
+
+def test_a_derivative_is_taken_on_the_first_edge_and_corrected_on_the_others():
+    edges, asked = [edge(r, 0.3) for r in (0.0, -0.02, -0.1)], [0, 0, 0]
+
+    def counted(k):
+        together = edges[k].together
+
+        def count(xs, last):
+            asked[k] += len(xs)
+            return together(xs, last)
+
+        edges[k].together = count
+
+    for k in range(3):
+        counted(k)
+    _, x = settle_pull(edges, WANTED.start, PHASE, [], lambda *_: None)
+    assert asked[1] < asked[0]
+    assert x[NU] - WANTED.start[NU] in [pytest.approx(r, abs=0.02) for r in (0.0, -0.02, -0.1)]
