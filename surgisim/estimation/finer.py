@@ -22,8 +22,8 @@ Say = Callable[[float, float, str], None]
 def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[Trial, Solution]:
     """The fit on a finer grid; the same one, with a line in `history`, where that cannot be simulated.
 
-    The first steps go by the wider grid's derivative. Then what waves depend on, the laws' numbers, gets one of its own:
-    how tissue is carried and how deep it is held moves it alike on both.
+    The first steps go by the wider grid's derivative. Then the laws' numbers, on which waves depend, get one of their
+    own; how tissue is carried and how deep it is held moves it alike on both grids.
     """
     fine = replace(trial, laying=trial.laying.finer(FINER))
     wanted = trial.wanted
