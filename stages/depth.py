@@ -1,11 +1,12 @@
 """Tell how far away the tissue is, behind the instrument too.
 
-reads   inpainted.npz, masks.npz, given.npz, camera.json
+reads   frames.npz, inpainted.npz, masks.npz, given.npz, camera.json
 writes  depth.npz  Depth, camera frame [m]
 """
 
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.depth import Depth
+from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.given import Given
 from surgisim.artifacts.inpainted import Inpainted
 from surgisim.artifacts.masks import Masks
@@ -14,14 +15,14 @@ from surgisim.stage import stage
 
 
 @stage(
-    reads={"inpainted": Inpainted, "masks": Masks, "given": Given, "camera": Camera},
+    reads={"frames": Frames, "inpainted": Inpainted, "masks": Masks, "given": Given, "camera": Camera},
     writes={"depth": Depth},
     settings=Settings,
 )
-def main(inpainted, masks, given, camera, *, settings, progress):
+def main(frames, inpainted, masks, given, camera, *, settings, progress):
     from surgisim.perception.depth.distance import depth
 
-    return depth(inpainted, masks, given, camera, settings, progress=progress)
+    return depth(frames, inpainted, masks, given, camera, settings, progress=progress)
 
 
 if __name__ == "__main__":

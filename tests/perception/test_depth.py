@@ -1,15 +1,17 @@
+import cv2
 import numpy as np
 import pytest
 from pulled_sheet import camera, pull_sheet
 
+from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.given import Given
 from surgisim.artifacts.inpainted import COPIED, SEEN, Inpainted
 from surgisim.artifacts.masks import Masks
 from surgisim.config.depth import Depth as Settings
 from surgisim.lighting.headlight import to_srgb
-from surgisim.perception.depth import near_light, shading
+from surgisim.perception.depth import near_light, shading, stereo
 from surgisim.perception.depth.complete import complete
-from surgisim.perception.depth.distance import depth
+from surgisim.perception.depth.distance import depth as of_frames
 from surgisim.perception.tracking.between import sample
 from surgisim.problem import Problem
 
@@ -119,6 +121,28 @@ def test_a_right_view_gives_depth_and_a_baseline_its_scale(baseline, scale):
     assert np.allclose(np.median(result.z), want, rtol=0.01)
 
 
+def test_a_right_view_is_matched_below_the_pixel_and_only_where_it_reaches():
+    rng = np.random.default_rng(2)
+    paint = cv2.GaussianBlur(rng.uniform(0, 255, (64, 140, 3)), (0, 0), 1.2)
+    paint = 128 + 4 * (paint - 128)
+    y, x = np.indices((64, 96), np.float32)
+    left, right = (
+        np.clip(cv2.remap(paint, x + 20 + shift, y, cv2.INTER_CUBIC), 0, 255).astype(np.uint8) for shift in (0.0, 7.3)
+    )
+    found = stereo.match(left, right)
+    whole = found[8:-8, 16:-8]
+    refined = stereo.registered(left, right, found, found > 0.5)[8:-8, 16:-8]
+    assert np.abs(refined - 7.3).mean() < 0.03
+    assert np.abs(refined - 7.3).mean() < 0.5 * np.abs(whole - 7.3).mean()
+    cam, given = (
+        camera(96, 64, 2),
+        Given(np.zeros((0, 64, 96), bool), NONE.reshape(0, 64, 96), np.stack([right] * 2), 0.004),
+    )
+    z, trust, _ = stereo.estimate(np.stack([left] * 2), np.zeros((2, 64, 96), bool), given, cam, distance=0.07)
+    assert z[0][:, 20:80] == pytest.approx(cam.fx * 0.004 / 7.3, rel=0.02)
+    assert trust[:, 10:-10, 1:5].mean() < 0.5 * trust[:, 10:-10, 20:80].mean()
+
+
 def test_what_was_not_seen_is_hardly_trusted():
     inpainted, masks = _clip(5)
     origin = np.where(np.arange(64) < 20, COPIED, SEEN) * np.ones((5, 48, 1), int)
@@ -140,6 +164,12 @@ def test_a_backend_without_its_input_says_what_it_wants(backend, word):
     with pytest.raises(Problem, match=word) as problem:
         depth(*_clip(2), given, camera(64, 48, 2), Settings(backend=backend))
     assert "near_light" in str(problem.value)
+
+
+def depth(inpainted, masks, given, cam, settings):
+    """Of a recording from which nothing had to be taken away."""
+    frames = Frames(inpainted.rgb, np.zeros(len(inpainted.rgb), np.uint8))
+    return of_frames(frames, inpainted, masks, given, cam, settings)
 
 
 def _clip(frames: int) -> tuple[Inpainted, Masks]:

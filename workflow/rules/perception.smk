@@ -76,6 +76,7 @@ rule inpainting:
 
 rule depth:
     input:
+        frames=upstream("ingest", "frames.npz"),
         inpainted=upstream("inpainting", "inpainted.npz"),
         masks=upstream("masking", "masks.npz"),
         given=upstream("ingest", "given.npz"),
@@ -96,7 +97,7 @@ rule depth:
         code=code("depth"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/depth.py"'
-        " --inpainted {input.inpainted} --masks {input.masks} --given {input.given}"
+        " --frames {input.frames} --inpainted {input.inpainted} --masks {input.masks} --given {input.given}"
         " --camera {input.camera} --depth {output.depth}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 

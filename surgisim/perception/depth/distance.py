@@ -6,6 +6,7 @@ import numpy as np
 
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.depth import Depth
+from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.given import Given
 from surgisim.artifacts.inpainted import SEEN, Inpainted
 from surgisim.artifacts.masks import Masks
@@ -18,6 +19,7 @@ FLAT = 0.1
 
 
 def depth(
+    frames: Frames,
     inpainted: Inpainted,
     masks: Masks,
     given_: Given,
@@ -28,16 +30,18 @@ def depth(
 ) -> Depth:
     """z of the tissue in every pixel, behind the instrument too."""
     rgb = inpainted.rgb
-    if masks.tool.shape != rgb.shape[:3]:
+    if not masks.tool.shape == rgb.shape[:3] == frames.rgb.shape[:3]:
         raise Problem(
-            f"depth: masks are {masks.tool.shape} and frames {rgb.shape[:3]}; pass masks of the same clip and size."
+            f"depth: masks are {masks.tool.shape}, frames {frames.rgb.shape[:3]} and inpainted frames {rgb.shape[:3]}; "
+            "pass those of one clip and size."
         )
     hidden = masks.tool | (inpainted.origin != SEEN)
     name = choose(settings.backend, given_)
     if name == "given":
         z, confidence, scale = given.estimate(given_, hidden, camera, rgb, distance=settings.distance)
     elif name == "stereo":
-        z, confidence, scale = stereo.estimate(rgb, hidden, given_, camera, distance=settings.distance)
+        # The right view shows the instrument too.
+        z, confidence, scale = stereo.estimate(frames.rgb, hidden, given_, camera, distance=settings.distance)
     elif name == "depth_anything":
         z, confidence, scale = depth_anything.estimate(
             rgb, hidden, settings.weights, distance=settings.distance, range_=settings.range, progress=progress

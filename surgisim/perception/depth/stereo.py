@@ -1,6 +1,9 @@
-"""Depth from a second, rectified view: semi-global matching.
+"""Depth from a second, rectified view: semi-global matching, then registration below the pixel.
 
-Hirschmueller, Stereo processing by semiglobal matching and mutual information, 2008, as OpenCV has it.
+Hirschmueller, Stereo processing by semiglobal matching and mutual information, 2008, as OpenCV has it: right to a
+quarter of a pixel, and drawn to whole ones. How depth changes shows in less, so each pixel's neighbourhood is then
+shifted to where it fits the other view best (Lucas and Kanade, An iterative image registration technique with an
+application to stereo vision, 1981).
 """
 
 import cv2
@@ -9,10 +12,19 @@ import numpy as np
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.given import Given
 from surgisim.perception.depth.complete import complete
+from surgisim.perception.tracking.spread import spread
 from surgisim.problem import Problem
 
 NEAREST = 0.25
 """Largest disparity looked for, as a share of the image's width."""
+WINDOW, LEAST_WINDOW = 0.012, 2.5
+"""Standard deviation of the neighbourhood that is registered, as a share of the image's width; in pixels at least."""
+NOISE = 2.0
+"""Brightness of a picture that tells nothing [0-255]."""
+EDGE = 2
+"""Columns at the other view's edge that nothing is matched with."""
+ROUNDS = 5
+"""Of registration."""
 
 
 def estimate(
@@ -20,15 +32,19 @@ def estimate(
 ) -> tuple[np.ndarray, np.ndarray, str]:
     """Depth [m], confidence (T, H, W) and whether its scale is known.
 
-    rgb: left view, sRGB (T, H, W, 3) uint8. hidden: pixels that are not the tissue's own, (T, H, W) bool. Without a
-    baseline, or with a focal length that is only assumed, the median depth of frame 0 becomes `distance` [m].
+    rgb: left view as it was filmed, sRGB (T, H, W, 3) uint8. hidden: pixels that are not tissue's own, (T, H, W) bool.
+    Without a baseline, or with a focal length that is only assumed, the median depth of frame 0 becomes `distance` [m].
     """
     if given.right.shape != rgb.shape:
         raise Problem(
             f"depth: the right view is {given.right.shape} and the left {rgb.shape}; pass views of the same frames."
         )
     disparity = np.stack([match(left, right) for left, right in zip(rgb, given.right, strict=True)])
-    known = disparity > 0.5
+    # What lies left of the right view's edge was matched with nothing.
+    known = (disparity > 0.5) & (np.arange(rgb.shape[2]) - disparity >= EDGE)
+    disparity = np.stack([
+        registered(*views) for views in zip(rgb, given.right, disparity, known & ~hidden, strict=True)
+    ])  # fmt: skip
     share = (known & ~hidden).sum() / max((~hidden).sum(), 1)
     if share < 0.05:
         raise Problem(
@@ -63,6 +79,27 @@ def match(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     pads = [np.pad(np.ascontiguousarray(v), ((0, 0), (most, 0), (0, 0)), mode="edge") for v in (left, right)]
     found = matcher.compute(*pads)[:, most:]
     return found.astype(np.float32) / 16
+
+
+def registered(left: np.ndarray, right: np.ndarray, disparity: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Disparity (H, W) [px] where it is known (H, W), to where neighbourhoods of both views (H, W, 3) agree best."""
+    width = max(LEAST_WINDOW, WINDOW * left.shape[1])
+
+    def around(field: np.ndarray, times: float = 1.0) -> np.ndarray:
+        return cv2.GaussianBlur(field, (0, 0), times * width)
+
+    # What is alike over the whole neighbourhood is the lamp's and the lens's doing.
+    left, right = (v.astype(np.float32) - around(v.astype(np.float32), 3.0) for v in (left, right))
+    steep = cv2.Sobel(right, cv2.CV_32F, 1, 0, scale=1 / 8)
+    y, x = np.indices(disparity.shape, np.float32)
+    shift = spread(disparity, known.astype(np.float32)).astype(np.float32)
+    for _ in range(ROUNDS):
+        at = x - shift
+        there, slope = (cv2.remap(v, at, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE) for v in (right, steep))
+        inside = known & (at >= 0)
+        miss, sharp = (((a * slope).sum(-1) * inside).astype(np.float32) for a in (left - there, slope))
+        shift = shift - np.clip(around(miss) / (around(sharp) + NOISE**2), -0.5, 0.5)
+    return shift
 
 
 def measured(disparity: np.ndarray, baseline: float, camera: Camera) -> np.ndarray:
