@@ -17,7 +17,7 @@ from surgisim.problem import Problem
 
 NEAREST = 0.25
 """Largest disparity looked for, as a share of the image's width."""
-WINDOW, LEAST_WINDOW = 0.012, 2.5
+WINDOW, LEAST_WINDOW = 0.02, 4.0
 """Standard deviation of the neighbourhood that is registered, as a share of the image's width; in pixels at least."""
 NOISE = 2.0
 """Brightness of a picture that tells nothing [0-255]."""
