@@ -8,7 +8,7 @@ import numpy as np
 from surgisim.estimation.gauss_newton import Solution, derivative
 from surgisim.estimation.otherwise import Otherwise, on_no_grid, settled
 from surgisim.estimation.rounds import number, plain
-from surgisim.estimation.trial import Trial
+from surgisim.estimation.trial import WORKERS, Trial
 from surgisim.mpm.simulator import Breakdown
 
 FINER, NEARLY = 1.5, 1e-3
@@ -26,11 +26,12 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
     own; how tissue is carried and how deep it is held moves it alike on both grids.
     """
     fine = replace(trial, laying=trial.laying.finer(FINER))
-    wanted = trial.wanted
+    # Steps are simulated one after another, so each has all the threads.
+    alone, wanted = replace(fine, laying=fine.laying.shared(WORKERS)), trial.wanted
     change = on_no_grid(fine, solution.x)[0] - on_no_grid(trial, solution.x)[0]
     begin = np.clip(solution.x - change, *wanted.bounds)
     say(0.0, 1.0, "on a finer grid")
-    found = settled(Otherwise("finer grid", fine, begin=begin), solution)
+    found = settled(Otherwise("finer grid", alone, begin=begin), solution)
     if found.residual is None:
         # A finer grid follows a sharper fold, and can turn inside out where a wider one does not.
         history.append({"round": "finer grid", "cost": None, "broke": BROKE})
@@ -43,6 +44,6 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
         history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
         return trial, solution
     here = Solution(found.x, found.residual, np.where(laws, own, found.jacobian))
-    found = settled(Otherwise("finer grid", fine, begin=found.x), here, enough=NEARLY)
+    found = settled(Otherwise("finer grid", alone, begin=found.x), here, enough=NEARLY)
     history.append({"round": "finer grid", "cost": number(found.cost)} | plain(wanted, found.x))
     return fine, replace(here, x=found.x, residual=found.residual)

@@ -7,7 +7,7 @@ simulation with it.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Self
 
 import numpy as np
@@ -168,8 +168,8 @@ class Laying:
     rim: bool
     """Whether it is held where it ends there."""
     observation: Observation
-    make: Callable[[Body, Motion], Prepared]
-    """Prepare a body under a motion whose grips it will feel."""
+    make: Callable[..., Prepared]
+    """Prepare a body under a motion whose grips it will feel, on so many `threads`."""
     base: bool = True
     """Whether it is held from below."""
     kept: dict = field(default_factory=dict, compare=False)
@@ -181,6 +181,10 @@ class Laying:
     def finer(self, times: float) -> Self:
         """The same on a grid that many times as fine."""
         return replace(self, columns=finer(self.columns, times), kept={})
+
+    def shared(self, threads: int) -> Self:
+        """The same with bodies of which several threads each simulate a share."""
+        return replace(self, make=partial(self.make, threads=threads), kept={})
 
     @cached_property
     def whole(self) -> Columns:

@@ -21,7 +21,7 @@ class Breaking:
 
 
 def test_a_finer_grid_that_breaks_down_leaves_the_fit_as_it_was(monkeypatch):
-    laying = SimpleNamespace(finer=lambda times: f"{times} times finer")
+    laying = SimpleNamespace(finer=lambda times: SimpleNamespace(shared=lambda threads: None))
     wanted = SimpleNamespace(bounds=(np.full(2, -9.0), np.full(2, 9.0)), spread=np.ones(2))
     trial = Breaking(laying, wanted)
     monkeypatch.setattr(finer, "on_no_grid", lambda trial, x: (np.zeros(2), np.zeros((2, 2))))
