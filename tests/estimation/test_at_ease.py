@@ -83,7 +83,7 @@ def test_what_is_never_told_keeps_its_prior():
 
 def test_a_field_is_found_at_ease_and_brought_back():
     case = clip(motion=slowly(), stiff=lambda rest: np.where(rest[:, 0] < 0, 3.0, 1.0))
-    settings = QUICK | {"field_iterations": 3, "iterations": 2}
+    settings = QUICK | {"field_iterations": 5, "iterations": 2}
     material, _, fit, *_ = estimate(*case, Estimation(**settings), silent)
     assert fit.held_out["field_kept"]
     E = material.values[:, list(material.names).index("corotated.E")]
