@@ -134,10 +134,8 @@ def test_a_right_view_is_matched_below_the_pixel_and_only_where_it_reaches():
     refined = stereo.registered(left, right, found, found > 0.5)[8:-8, 16:-8]
     assert np.abs(refined - 7.3).mean() < 0.03
     assert np.abs(refined - 7.3).mean() < 0.5 * np.abs(whole - 7.3).mean()
-    cam, given = (
-        camera(96, 64, 2),
-        Given(np.zeros((0, 64, 96), bool), NONE.reshape(0, 64, 96), np.stack([right] * 2), 0.004),
-    )
+    cam = camera(96, 64, 2)
+    given = Given(np.zeros((0, 64, 96), bool), NONE.reshape(0, 64, 96), np.stack([right] * 2), 0.004)
     z, trust, _ = stereo.estimate(np.stack([left] * 2), np.zeros((2, 64, 96), bool), given, cam, distance=0.07)
     assert z[0][:, 20:80] == pytest.approx(cam.fx * 0.004 / 7.3, rel=0.02)
     assert trust[:, 10:-10, 1:5].mean() < 0.5 * trust[:, 10:-10, 20:80].mean()

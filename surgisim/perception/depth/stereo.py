@@ -18,7 +18,8 @@ from surgisim.problem import Problem
 NEAREST = 0.25
 """Largest disparity looked for, as a share of the image's width."""
 WINDOW, LEAST_WINDOW = 0.02, 4.0
-"""Standard deviation of the neighbourhood that is registered, as a share of the image's width; in pixels at least."""
+"""Standard deviation of the neighbourhood that is registered, as a share of the image's width; in pixels at least;
+chosen on five clips of family 16180."""
 NOISE = 2.0
 """Brightness of a picture that tells nothing [0-255]."""
 EDGE = 2
@@ -41,16 +42,14 @@ def estimate(
         )
     disparity = np.stack([match(left, right) for left, right in zip(rgb, given.right, strict=True)])
     # What lies left of the right view's edge was matched with nothing.
-    known = (disparity > 0.5) & (np.arange(rgb.shape[2]) - disparity >= EDGE)
-    disparity = np.stack([
-        registered(*views) for views in zip(rgb, given.right, disparity, known & ~hidden, strict=True)
-    ])  # fmt: skip
-    share = (known & ~hidden).sum() / max((~hidden).sum(), 1)
+    known = (disparity > 0.5) & (np.arange(rgb.shape[2]) - disparity >= EDGE) & ~hidden
+    share = known.sum() / max((~hidden).sum(), 1)
     if share < 0.05:
         raise Problem(
             f"depth: only {100 * share:.0f} % of the left view is found in the right one. "
             "Check that the two views are rectified and in order, or set depth.backend to 'near_light'."
         )
+    disparity = np.stack([registered(*views) for views in zip(rgb, given.right, disparity, known, strict=True)])
     z = measured(disparity, given.baseline or 1.0, camera)
     z, trust = complete(z, known, ~hidden)
     if given.baseline > 0 and camera.focal_from == "given":
