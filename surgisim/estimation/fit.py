@@ -1,6 +1,6 @@
 """The whole estimation: support and start, rounds, a field where it pays, then what is known."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from functools import partial
 from typing import NamedTuple
@@ -25,6 +25,7 @@ from surgisim.estimation.damping import numerical_damping
 from surgisim.estimation.doubts import doubts, none, spreads
 from surgisim.estimation.finer import finely
 from surgisim.estimation.gauss_newton import Solution
+from surgisim.estimation.handed_on import handed_on
 from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.lay import Laying, upright
 from surgisim.estimation.light_along_tracks import brightness, spoilt
@@ -50,17 +51,17 @@ from surgisim.estimation.rounds import (
     at_ease,
     choose_support,
     descend,
-    handed_on,
     number,
     settle_grip,
     settle_pull,
     windows,
 )  # fmt: skip
-from surgisim.estimation.search import PACE, Search, search
+from surgisim.estimation.search import PACE, search
 from surgisim.estimation.starts import choose_start
 from surgisim.estimation.stated import by_phase
 from surgisim.estimation.support import EDGES, Support, open_depth
-from surgisim.estimation.trial import SAFETY, WORKERS, Trial
+from surgisim.estimation.trial import WORKERS, Trial
+from surgisim.estimation.written import physics_of, unfitted
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
 from surgisim.physics.catalogue import choose, columns
@@ -136,7 +137,7 @@ def estimate(
 
     reason = _nothing_to_learn(motion, tracks, body)
     if reason:
-        return Estimate(*_unfitted(make(body, motion), wanted, settings, camera, reason), motion, body, none(tracks))
+        return Estimate(*unfitted(make(body, motion), wanted, settings, camera, reason), motion, body, none(tracks))
     bodies = [make(body, motion) for _ in range(WORKERS)]
     observation = observe(tracks, motion, camera, bodies[0].simulator, floor=FLOOR * body.spacing)
     total = len(frames.rgb)
@@ -239,7 +240,7 @@ def estimate(
     )
     names = np.array(columns(choose(prepared.terms)))
     material = Material(names, theta.astype(np.float32), trial.held)
-    physics = _physics(prepared, values, table, settings, path.step, trial.grip)
+    physics = physics_of(prepared, values, table, settings, path.step, trial.grip)
     return Estimate(material, physics, fit, trial.motion, laid, unsure)
 
 
@@ -426,33 +427,3 @@ def _refined(
         progress=lambda done, of, text: progress(0.8 + 0.15 * done / of, 1.0, text),
     )  # fmt: skip
     return refined.theta, refined
-
-
-def _physics(
-    prepared: Prepared, values: Values, table: dict, settings: Estimation, step: float, grip: float = 1.0
-) -> Physics:
-    terms = {}
-    for law, term in choose(prepared.terms).items():
-        terms[law] = {}
-        for name, p in term.params.items():
-            entry = {"value": values[law][name], "unit": p.unit}
-            known = table.get(f"{law}.{name}")
-            if known:
-                entry |= {"tissue": known["value"], "low": known["low"], "high": known["high"]}
-                entry["identifiable"] = known["told"]
-            terms[law][name] = entry
-    grid = {"spacing": prepared.simulator.grid.spacing, "step": step}
-    return Physics(terms, settings.density, list(settings.gravity), grid, grip, settings.form, _told(prepared.places))
-
-
-def _told(places: Mapping[str, Place]) -> dict:
-    """Places as physics.json holds them."""
-    return {law: asdict(place) for law, place in places.items()}
-
-
-def _unfitted(prepared: Prepared, wanted: Search, settings: Estimation, camera: Camera, why: str):
-    values = wanted.values(wanted.start)
-    names = np.array(columns(choose(prepared.terms)))
-    material = Material(names, prepared.theta(values).astype(np.float32), prepared.body.held)
-    step = 1 / camera.fps / prepared.per_frame(values, camera.fps, SAFETY)
-    return material, _physics(prepared, values, {}, settings, step), Fit([], {}, {}, why)

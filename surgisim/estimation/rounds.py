@@ -20,7 +20,6 @@ from surgisim.estimation.rim import Rim
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import MIDDLE, SHARES, edges_of
 from surgisim.estimation.trial import WORKERS, Trial, at_once
-from surgisim.mpm.carried import Carried
 from surgisim.mpm.grip import runs
 from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.mpm.stable import shear_speed
@@ -35,9 +34,6 @@ NEARER = (0.0, -1.0, 1.0)
 """How much farther off than expected the grip ends there, in spreads of its prior."""
 GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
 """How firmly instruments may hold, tried in turn."""
-SQUEEZED, YIELDS = 0.05, 0.8
-"""Least share of its volume to which what is handed on may be squeezed, and how much softer than the last each grip is
-that is tried so that it holds; chosen."""
 TOO_VIOLENT = (
     "estimation: the body turns inside out under the recorded motion however softly it is held. Check the grip and its "
     "path (tracking), or give it (--grasp)."
@@ -117,28 +113,6 @@ def settle_grip(trial: Trial, x: np.ndarray, history: list) -> tuple[Trial, Run]
             return softer, softer.run(x)
         except Breakdown as breakdown:
             history.append({"round": "grip", "share": share, "cost": None, "broke": str(breakdown)})
-    raise Problem(TOO_VIOLENT)
-
-
-def handed_on(trial: Trial, x: np.ndarray, theta: np.ndarray, history: list) -> tuple[Trial, Run]:
-    """The settled trial with the firmest grip under which its body, theta (P, M), bears the whole clip with a margin.
-
-    Where tissue is all but inside out, rounding decides whether a replay of it breaks. Raises Problem when even the
-    softest grip does not help.
-    """
-    values, body = trial.wanted.values(x), trial.bodies[0]
-    particles = Carried(body.body.rest, body.simulator)
-    while trial.grip >= GRIPS[-1]:
-        try:
-            run = body.simulator.run(theta, trial.drive(values, stiffest=body.stiffest(theta)))
-            least = min(float(np.linalg.det(particles.at(u)[1]).min()) for u in run.u)
-            if least >= SQUEEZED:
-                return trial, run
-            broke = f"tissue is squeezed to {least:.3f} of its volume"
-        except Breakdown as breakdown:
-            broke = str(breakdown)
-        history.append({"round": "grip", "share": trial.grip, "cost": None, "broke": broke})
-        trial = replace(trial, grip=YIELDS * trial.grip)
     raise Problem(TOO_VIOLENT)
 
 

@@ -7,8 +7,9 @@ import pytest
 from slab import pulled, slab
 from slab_clip import FPS, TRUE, T
 
-from surgisim.estimation import rounds
-from surgisim.estimation.rounds import GRIPS, SQUEEZED, YIELDS, handed_on
+from surgisim.estimation import handed_on as margin
+from surgisim.estimation.handed_on import SQUEEZED, YIELDS, handed_on
+from surgisim.estimation.rounds import GRIPS
 from surgisim.estimation.search import search
 from surgisim.estimation.trial import Trial
 from surgisim.mpm.carried import Carried
@@ -47,7 +48,7 @@ def test_one_that_squeezes_tissue_too_far_gives_way_a_little(monkeypatch):
     trial, theta = settled(3.0)
     firm, run = handed_on(trial, trial.wanted.start, theta, [])
     bound, history = least(firm, run) + 0.02, []
-    monkeypatch.setattr(rounds, "SQUEEZED", bound)
+    monkeypatch.setattr(margin, "SQUEEZED", bound)
     chosen, run = handed_on(trial, trial.wanted.start, theta, history)
     assert 0.3 < chosen.grip < 1.0
     assert least(chosen, run) >= bound
@@ -69,3 +70,21 @@ def test_a_pull_that_no_grip_bears_is_refused():
     with pytest.raises(Problem, match="however softly"):
         handed_on(trial, trial.wanted.start, theta, history)
     assert history[-1]["share"] < GRIPS[-1] / YIELDS
+
+
+def test_of_what_squeezes_tissue_the_nearest_gives_way():
+    """Two patches of the edge run into one another, far from a grip that squeezes nothing."""
+    trial, theta = settled(1.0)
+    rest = trial.bodies[0].body.rest
+    low, high = rest.min(0), rest.max(0)
+    at = np.array([[low[0], low[1], low[2]], [low[0], low[1] + 0.3 * (high[1] - low[1]), low[2]], [*high[:2], low[2]]])
+    rim = np.repeat(at[:, None], T, axis=1)
+    rim[0, :, 1] += np.linspace(0.0, 3.0 * (at[1, 1] - at[0, 1]), T)
+    motion = dataclasses.replace(trial.motion, rim=rim, rim_radius=np.full(3, 0.2 * (at[1, 1] - at[0, 1])))
+    history = []
+    chosen, run = handed_on(dataclasses.replace(trial, motion=motion), trial.wanted.start, theta, history)
+    assert chosen.grip == 1.0
+    assert len(history) == 1
+    assert len(chosen.motion.rim) == 2
+    np.testing.assert_allclose(chosen.motion.rim[-1], rim[-1])
+    assert least(chosen, run) >= SQUEEZED
