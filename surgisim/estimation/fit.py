@@ -192,16 +192,17 @@ def estimate(
         unsure = none(tracks)
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
     support = Support(trial.depth(x), *edge, len(trial.motion.rim))
-    coarse, uniform = wide.settled(wide_x), wide.values(wide_x)
-    values, trial = trial.wanted.values(x), coarse if trial is wide else trial.settled(x)
+
+    def alone(trial: Trial) -> Trial:
+        """With one body, of which every thread simulates a share."""
+        return replace(trial, bodies=[make(trial.bodies[0].body, trial.motion, threads=WORKERS)])
+
+    coarse, uniform = alone(wide.settled(wide_x)), wide.values(wide_x)
+    values, trial = trial.wanted.values(x), coarse if trial is wide else alone(trial.settled(x))
     theta, refined = trial.theta(values), None
     if settings.enabled:
         # A field shapes what is slow, which the wider grid shows as well, at a fifth of the cost.
-        alone = make(coarse.bodies[0].body, coarse.motion, threads=WORKERS)
-        field, refined = _refined(
-            replace(coarse, bodies=[alone]), uniform, wide.eased or 0.0, scene, frames, masks, camera, settings,
-            progress,
-        )  # fmt: skip
+        field, refined = _refined(coarse, uniform, wide.eased or 0.0, scene, frames, masks, camera, settings, progress)
         theta = _brought(field, coarse, uniform, trial, values)
     x = x[: len(wanted.free)]
     trial, run = handed_on(trial, x, theta, history)

@@ -105,7 +105,9 @@ def gauss_newton(
             return Solution(x, r, J)
         small = np.abs(moved).max() < 5e-3 or gained < 3e-4
         done = small and fresh
-        J, fresh = (jacobian_at(x, r), True) if small or gained < RENEWED else (J, False)
+        # One that was just taken is followed a step farther before it is taken again.
+        stale = not fresh and (small or gained < RENEWED)
+        J, fresh = (jacobian_at(x, r), True) if stale else (J, False)
         if done:
             break
     return Solution(x, r, J if fresh or not renewed else jacobian_at(x, r))

@@ -27,6 +27,9 @@ SPLIT = 0.1
 """Largest share of the Gaussians split at once."""
 WIDEST = 10.0
 """Largest radius kept [median first radius]."""
+TRAJECTORY_EVERY = 2
+"""Iterations from one to the next that counts the trajectory term, as many times over: it costs as much as the whole
+field once more."""
 REPORTS = 100
 """Rows of the history."""
 
@@ -96,7 +99,7 @@ class Fit:
             self.camera,
             probe=probe,
         )
-        loss = self.misfit(phase, image, u) + self.priors(phase, field, radius, moved, time)
+        loss = self.misfit(phase, image, u) + self.priors(phase, field, radius, moved, time, iteration)
         if not torch.isfinite(loss):
             raise Problem(
                 f"reconstruction: the loss is not finite at iteration {iteration}, frame {self.seen.frame[u]}. "
@@ -123,7 +126,7 @@ class Fit:
         return color + settings.depth * depth
 
     def priors(
-        self, phase: Phase, field: Field, radius: torch.Tensor, moved: torch.Tensor, time: float
+        self, phase: Phase, field: Field, radius: torch.Tensor, moved: torch.Tensor, time: float, iteration: int
     ) -> torch.Tensor:
         """What is asked of scene and field besides the picture."""
         settings = self.settings
@@ -132,13 +135,13 @@ class Fit:
             unit = settings.anisotropy_unit * self.radius
             limits = {"r_m": settings.anisotropy_largest, "r_ani": settings.anisotropy_ratio}
             total = total + settings.anisotropy * anisotropic(radius, unit=unit, **limits)
-        if phase.trajectory and settings.trajectory and time > 0:
+        if phase.trajectory and settings.trajectory and time > 0 and iteration % TRAJECTORY_EVERY == 0:
             if self.groups is None:
                 points = self.adam.tensors["mean"].detach().numpy()
                 self.groups = torch.from_numpy(groups(points, settings.neighbours))
             before = field(self.adam.tensors["mean"], time - 1 / self.camera.fps)[0]
             literal = settings.trajectory_form == "literal"
-            total = total + settings.trajectory * trajectory(
+            total = total + TRAJECTORY_EVERY * settings.trajectory * trajectory(
                 (moved - before) / self.radius, self.groups, literal=literal
             )
         if phase.moves_field:
