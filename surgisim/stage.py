@@ -25,6 +25,10 @@ from surgisim.artifacts.base import Artifact, encoded, load, save_bytes
 from surgisim.config.base import Settings, parse
 from surgisim.problem import Problem
 
+SPINS = "3000"
+"""Rounds for which an idle thread waits awake. A reconstruction of 600 iterations on two processors took 24.5 s with
+none, 20.5 with 3,000, 18.8 with 20,000; beside another process that kept one of them busy 31, 35 and 61 s."""
+
 
 @dataclass(frozen=True)
 class Maybe:
@@ -99,8 +103,9 @@ def stage(
             cli.add_argument("--debug", action="store_true", help="show tracebacks")
             arguments = vars(cli.parse_args())
             # Idle threads of torch and of the compiled loops that spin on each other's cores cost several times the
-            # work itself. It has to be said before either is loaded.
+            # work itself; ones that sleep at once wake late. It has to be said before either is loaded.
             os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+            os.environ.setdefault("GOMP_SPINCOUNT", SPINS)
             with plain_errors(arguments["debug"] or bool(os.environ.get("SURGISIM_DEBUG"))):
                 _run(work, script.stem, reads, writes, settings, arguments)
 

@@ -38,7 +38,13 @@ class Field:
     """Weight matrices, each (out, in), without biases."""
 
     def __call__(self, mean: torch.Tensor, time: float) -> tuple[torch.Tensor, ...]:
-        """dmu [m] (G, 3), do (G,), dR (G, 4), dS (G, 3) of Gaussians resting at `mean` [m], (G, 3), at `time` [s]."""
+        """dmu [m] (G, 3), do (G,), dR (G, 4), dS (G, 3) of Gaussians resting at `mean` [m], (G, 3), at `time` [s].
+
+        At the box's first moment nothing has moved, whatever the weights are.
+        """
+        if self.clock(time) <= 0:
+            count = len(mean)
+            return tuple(mean.new_zeros(n) for n in ((count, 3), count, (count, 4), (count, 3)))
         x = features(self.planes, self.inside(mean), self.clock(time), self.layout)
         for weight in self.head[:-1]:
             # Not a ReLU: its slope at 0, where every feature starts, is 0, and nothing would ever move.

@@ -106,6 +106,10 @@ class Fit:
                 "Lower the step sizes (rate_mean, rate_planes, rate_head)."
             )
         loss.backward()
+        if phase.moves_field and time == 0:
+            # The rest scene says nothing of the head, which forgets what it was told all the same.
+            for name in self.head:
+                adam.tensors[name].grad = torch.zeros_like(adam.tensors[name])
         adam.advance(rate_at(iteration, self.settings.iterations, self.settings.rate_end))
         self.record.add(probe.grad, image.weight)
         whole = self.seen.weight[u] == 1
