@@ -91,7 +91,8 @@ def test_a_phase_moves_what_it_says_and_nothing_else(fit, phase):
     assert moved == (set(ATTRIBUTES) if phase.moves_canonical else set()) | (field if phase.moves_field else set())
 
 
-def test_the_trajectory_term_acts_in_its_phases_only(clip, fit):
+@pytest.mark.parametrize("iteration", [0, 1, 2])
+def test_the_trajectory_term_acts_every_other_iteration_of_its_phases(clip, fit, iteration):
     fit.step(PHASES[0], 5, 0)
     calm = clip.settings.model_copy(update={"trajectory": 0.0})
     for phase in PHASES:
@@ -101,8 +102,17 @@ def test_the_trajectory_term_acts_in_its_phases_only(clip, fit):
             field, mean = fit.current_field(), fit.adam.tensors["mean"]
             moved, _, _, grow = field(mean, 0.2)
             radius = (fit.adam.tensors["scale"] + grow).exp()
-            values.append(fit.priors(phase, field, radius, moved, 0.2).item())
-        assert (values[0] > values[1]) == phase.trajectory
+            values.append(fit.priors(phase, field, radius, moved, 0.2, iteration).item())
+        assert (values[0] > values[1]) == (phase.trajectory and iteration != 1)
+
+
+def test_the_rest_scene_says_nothing_of_the_field(clip, fit):
+    """Only what keeps planes smooth moves them where time has not begun, and the head keeps its weights at first."""
+    calm = clip.settings.model_copy(update={"smoothness_space": 0.0, "smoothness_time": 0.0})
+    fit.settings = calm
+    before = {name: t.detach().clone() for name, t in fit.adam.tensors.items()}
+    fit.step(PHASES[0], 0, 0)
+    assert all(torch.equal(fit.adam.tensors[name].detach(), before[name]) for name in ("planes", *fit.head))
 
 
 def test_a_number_that_is_not_finite_stops_the_fit_and_names_the_frame(fit):
