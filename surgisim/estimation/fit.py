@@ -20,12 +20,12 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
+from surgisim.estimation.bearing import borne, handed_on
 from surgisim.estimation.carrying import OPENS, carrying, course
 from surgisim.estimation.damping import numerical_damping
 from surgisim.estimation.doubts import doubts, none, spreads
 from surgisim.estimation.finer import finely
 from surgisim.estimation.gauss_newton import Solution
-from surgisim.estimation.handed_on import handed_on
 from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.lay import Laying, upright
 from surgisim.estimation.light_along_tracks import brightness, spoilt
@@ -52,7 +52,6 @@ from surgisim.estimation.rounds import (
     choose_support,
     descend,
     number,
-    settle_grip,
     settle_pull,
     windows,
 )  # fmt: skip
@@ -155,11 +154,11 @@ def estimate(
     }
     x, history, table = trial.wanted.start, [], {}
     progress = _onward(progress)
-    trial, run = settle_grip(trial, x, history)
+    trial, run = borne(trial, x, history)
     default, edges = trial.stand(x)[0].observation, [trial]
     if trial.laying:
         edges, x = choose_support(trial, phase, history, progress)
-        edges = [settle_grip(one, x, history)[0] for one in edges]
+        edges = [borne(one, x, history)[0] for one in edges]
         trial = edges[0]
     searched = settings.enabled and bool(wanted.free)
     if searched:

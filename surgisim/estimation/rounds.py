@@ -14,6 +14,7 @@ from scipy.fft import dct
 
 from surgisim.artifacts.motion import Motion
 from surgisim.config.estimation import Estimation
+from surgisim.estimation.bearing import borne, softer
 from surgisim.estimation.gauss_newton import Solution, gauss_newton, misfit
 from surgisim.estimation.observation import PHASES
 from surgisim.estimation.rim import Rim
@@ -21,10 +22,9 @@ from surgisim.estimation.search import Search
 from surgisim.estimation.support import MIDDLE, SHARES, edges_of
 from surgisim.estimation.trial import WORKERS, Trial, at_once
 from surgisim.mpm.grip import runs
-from surgisim.mpm.simulator import Breakdown, Run
+from surgisim.mpm.simulator import Breakdown
 from surgisim.mpm.stable import shear_speed
 from surgisim.physics.catalogue import choose
-from surgisim.problem import Problem
 
 INDEPENDENT = 0.02
 """Share of residuals counted as independent: neighbouring points and frames share their tracking error."""
@@ -32,12 +32,6 @@ RATIOS = (0.40, 0.47)
 """Poisson's ratios at which supports are compared: both shape the spread of a load, so neither is judged alone."""
 NEARER = (0.0, -1.0, 1.0)
 """How much farther off than expected the grip ends there, in spreads of its prior."""
-GRIPS = (1.0, 0.3, 0.1, 0.03, 0.01)
-"""How firmly instruments may hold, tried in turn."""
-TOO_VIOLENT = (
-    "estimation: the body turns inside out under the recorded motion however softly it is held. Check the grip and its "
-    "path (tracking), or give it (--grasp)."
-)
 INERTIA = 0.005
 """Share of what a pull moves the tissue by that it may lag for its inertia, where its shape alone is asked for: at .02
 a slab held 15 mm deep is found held 13.3 mm deep, at .005 14.5 mm, at the pace of its own modulus 14.7 mm."""
@@ -99,21 +93,6 @@ def at_ease(trial: Trial) -> Trial:
     if free or not trial.calm or any(t.memory for t in laws) or not hurried:
         return trial
     return replace(trial, eased=-hurried)
-
-
-def settle_grip(trial: Trial, x: np.ndarray, history: list) -> tuple[Trial, Run]:
-    """The trial with the firmest grip, not firmer than its own, under which the whole clip can be simulated at x.
-
-    Tracks at the jaws are the worst there are, and a firm grip that follows them can turn the tissue inside
-    out; a softer one lets it slip. Raises Problem when even the softest does not help.
-    """
-    for share in [g for g in GRIPS if g <= trial.grip]:
-        softer = replace(trial, grip=share)
-        try:
-            return softer, softer.run(x)
-        except Breakdown as breakdown:
-            history.append({"round": "grip", "share": share, "cost": None, "broke": str(breakdown)})
-    raise Problem(TOO_VIOLENT)
 
 
 def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> tuple[list[Trial], np.ndarray]:
@@ -264,14 +243,13 @@ def descend(
 ) -> tuple[Trial, Solution]:  # fmt: skip
     """Gauss-Newton from x over windows that end at these frames, the last at the last fitted one.
 
-    Where a firmer grip cannot be simulated, a softer one holds from there on. jacobian: a derivative, (R, M), that is
+    What cannot be borne gives way from there on. jacobian: a derivative, (R, M), that is
     nearly right there already, where there is but one window.
     """
     wanted = trial.wanted
     for k, last in enumerate(ends):
         # What fits a window may turn the tissue inside out in the next.
-        while trial.residual(x, last=last) is None:
-            trial = _softer(trial, history, "what fits a shorter window cannot be simulated in a longer one")
+        trial, _ = borne(trial, x, history, last)
         solution = None
         while solution is None:
 
@@ -299,18 +277,9 @@ def descend(
                     jacobian=jacobian,
                 )
             except Breakdown as breakdown:
-                trial = _softer(trial, history, str(breakdown))
+                trial = softer(trial, x, history, breakdown)
         x = solution.x
     return trial, solution
-
-
-def _softer(trial: Trial, history: list, why: str) -> Trial:
-    """The trial with the next softer grip; raises Breakdown where there is none."""
-    softer = [g for g in GRIPS if g < trial.grip]
-    if not softer:
-        raise Breakdown(f"estimation: {why}, however softly the tissue is held. Check the grip and its path (--grasp).")
-    history.append({"round": "grip", "share": trial.grip, "cost": None, "broke": why})
-    return replace(trial, grip=softer[0])
 
 
 def windows(fitted: np.ndarray, phase: np.ndarray, share: float) -> list[int]:

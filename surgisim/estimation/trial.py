@@ -123,12 +123,12 @@ class Trial:
         """
         last = int(self.fitted[-1]) if last is None else last
         try:
-            run, observation = self._run(x, worker, self._until(last))
+            run, observation = self._run(x, worker, self.until(last))
         except Breakdown:
             return None
         return self.judged(run.u, observation, last)
 
-    def _until(self, last: int) -> int:
+    def until(self, last: int) -> int:
         """The frame up to which a run goes whose misfit is wanted up to `last`."""
         return last if last < self.fitted[-1] else self.frames - 1
 
@@ -204,7 +204,7 @@ class Trial:
         most = max(self.per_frame(v) for v in values)
         motions = [self.wanted.motion(x, self.motion) for x in points]
         drives = [self.drive(v, per_frame=most, motion=m) for v, m in zip(values, motions, strict=True)]
-        runs = self.batch.run([self.theta(v) for v in values], drives, last=self._until(last))
+        runs = self.batch.run([self.theta(v) for v in values], drives, last=self.until(last))
         return [None if isinstance(run, Breakdown) else self.judged(run.u, self.observation, last) for run in runs]
 
     @cached_property

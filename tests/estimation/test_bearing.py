@@ -1,4 +1,4 @@
-"""What an estimation hands on can be simulated elsewhere: no tissue of it is all but inside out."""
+"""What a body cannot bear gives way, and what is handed on bears its clip with a margin."""
 
 import dataclasses
 
@@ -7,9 +7,8 @@ import pytest
 from slab import pulled, slab
 from slab_clip import FPS, TRUE, T
 
-from surgisim.estimation import handed_on as margin
-from surgisim.estimation.handed_on import SQUEEZED, YIELDS, handed_on
-from surgisim.estimation.rounds import GRIPS
+from surgisim.estimation import bearing
+from surgisim.estimation.bearing import GRIPS, SQUEEZED, YIELDS, borne, handed_on
 from surgisim.estimation.search import search
 from surgisim.estimation.trial import Trial
 from surgisim.mpm.carried import Carried
@@ -48,7 +47,7 @@ def test_one_that_squeezes_tissue_too_far_gives_way_a_little(monkeypatch):
     trial, theta = settled(3.0)
     firm, run = handed_on(trial, trial.wanted.start, theta, [])
     bound, history = least(firm, run) + 0.02, []
-    monkeypatch.setattr(margin, "SQUEEZED", bound)
+    monkeypatch.setattr(bearing, "SQUEEZED", bound)
     chosen, run = handed_on(trial, trial.wanted.start, theta, history)
     assert 0.3 < chosen.grip < 1.0
     assert least(chosen, run) >= bound
@@ -72,19 +71,34 @@ def test_a_pull_that_no_grip_bears_is_refused():
     assert history[-1]["share"] < GRIPS[-1] / YIELDS
 
 
-def test_of_what_squeezes_tissue_the_nearest_gives_way():
-    """Two patches of the edge run into one another, far from a grip that squeezes nothing."""
-    trial, theta = settled(1.0)
+def run_into_one_another(trial: Trial, farther: float) -> Trial:
+    """The trial with three patches along its edge, far from the grip, of which one is carried through the next."""
     rest = trial.bodies[0].body.rest
-    low, high = rest.min(0), rest.max(0)
-    at = np.array([[low[0], low[1], low[2]], [low[0], low[1] + 0.3 * (high[1] - low[1]), low[2]], [*high[:2], low[2]]])
-    rim = np.repeat(at[:, None], T, axis=1)
-    rim[0, :, 1] += np.linspace(0.0, 3.0 * (at[1, 1] - at[0, 1]), T)
-    motion = dataclasses.replace(trial.motion, rim=rim, rim_radius=np.full(3, 0.2 * (at[1, 1] - at[0, 1])))
-    history = []
-    chosen, run = handed_on(dataclasses.replace(trial, motion=motion), trial.wanted.start, theta, history)
+    (left, top, z), (right, bottom, _) = rest.min(0), rest.max(0)
+    apart = 0.3 * (bottom - top)
+    rim = np.repeat(np.array([[left, top, z], [left, top + apart, z], [right, bottom, z]])[:, None], T, axis=1)
+    rim[0, :, 1] += np.linspace(0.0, farther * apart, T)
+    motion = dataclasses.replace(trial.motion, rim=rim, rim_radius=np.full(3, 0.2 * apart))
+    return dataclasses.replace(trial, motion=motion)
+
+
+@pytest.mark.parametrize("hands_on", [True, False], ids=["handed on", "on the way"])
+def test_of_what_squeezes_tissue_the_nearest_gives_way(hands_on):
+    """A grip that squeezes nothing stays as firm as it was."""
+    trial, theta = settled(1.0)
+    trial = run_into_one_another(trial, 3.0 if hands_on else 6.0)
+    x, history = trial.wanted.start, []
+    chosen, run = handed_on(trial, x, theta, history) if hands_on else borne(trial, x, history)
     assert chosen.grip == 1.0
     assert len(history) == 1
+    np.testing.assert_array_equal(chosen.motion.rim[-1], trial.motion.rim[-1])
     assert len(chosen.motion.rim) == 2
-    np.testing.assert_allclose(chosen.motion.rim[-1], rim[-1])
     assert least(chosen, run) >= SQUEEZED
+
+
+def test_where_nothing_is_left_to_give_way_the_clip_is_refused():
+    trial, _ = settled(40.0)
+    history = []
+    with pytest.raises(Problem, match="however softly"):
+        borne(run_into_one_another(trial, 0.0), trial.wanted.start, history)
+    assert {h["share"] for h in history} == set(GRIPS)
