@@ -6,6 +6,7 @@ import numpy as np
 
 from surgisim.estimation.trial import Trial
 from surgisim.mpm.carried import Carried
+from surgisim.mpm.setup import Values
 from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.problem import Problem
 
@@ -43,13 +44,14 @@ def softer(trial: Trial, x: np.ndarray, history: list, breakdown: Breakdown) -> 
     return _gives_way(trial, place, next((g for g in GRIPS if g < trial.grip), None))
 
 
-def handed_on(trial: Trial, x: np.ndarray, theta: np.ndarray, history: list) -> tuple[Trial, Run]:
-    """The settled trial, whose body, theta (P, M), bears the whole clip with a margin, and the run of it.
+def handed_on(trial: Trial, values: Values, theta: np.ndarray, history: list) -> tuple[Trial, Run]:
+    """The settled trial, whose body, theta (P, M), bears the whole clip with a margin, and the run of it; values: the
+    laws' numbers that it is held for.
 
     Where tissue is all but inside out, rounding decides whether a replay of it breaks, on this machine or on the next.
     Raises Problem when even without any patch of the edge the softest grip squeezes it too far.
     """
-    values, body = trial.wanted.values(x), trial.bodies[0]
+    body = trial.bodies[0]
     particles = Carried(body.body.rest, body.simulator)
     while True:
         try:

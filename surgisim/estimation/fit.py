@@ -190,21 +190,27 @@ def estimate(
         wide, wide_x = trial, x
         unsure = none(tracks)
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
-    support = Support(trial.depth(x), *edge, len(trial.motion.rim))
+    depth = trial.depth(x)
 
     def alone(trial: Trial) -> Trial:
         """With one body, of which every thread simulates a share."""
         return replace(trial, bodies=[make(trial.bodies[0].body, trial.motion, threads=WORKERS)])
 
     coarse, uniform = alone(wide.settled(wide_x)), wide.values(wide_x)
-    values, trial = trial.wanted.values(x), coarse if trial is wide else alone(trial.settled(x))
+    if settings.enabled:
+        coarse, _ = handed_on(coarse, uniform, coarse.theta(uniform), history)
+    values, finer = trial.wanted.values(x), trial is not wide
+    trial = alone(trial.settled(x)) if finer else coarse
+    if finer:
+        edge_kept = {"rim": coarse.motion.rim, "rim_radius": coarse.motion.rim_radius}
+        trial = replace(trial, grip=coarse.grip, motion=replace(trial.motion, **edge_kept))
     theta, refined = trial.theta(values), None
     if settings.enabled:
         # A field shapes what is slow, which the wider grid shows as well, at a fifth of the cost.
         field, refined = _refined(coarse, uniform, wide.eased or 0.0, scene, frames, masks, camera, settings, progress)
         theta = _brought(field, coarse, uniform, trial, values)
-    x = x[: len(wanted.free)]
-    trial, run = handed_on(trial, x, theta, history)
+    trial, run = handed_on(trial, values, theta, history)
+    support = Support(depth, *edge, len(trial.motion.rim))
     prepared, laid = trial.bodies[0], trial.bodies[0].body
     path = trial.drive(values, stiffest=prepared.stiffest(theta))
     after = {name: trial.observation.error(run.u, at) for name, at in parts.items()}

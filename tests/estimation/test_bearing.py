@@ -28,6 +28,10 @@ def settled(farther: float) -> tuple[Trial, np.ndarray]:
     return trial, trial.theta(wanted.values(wanted.start))
 
 
+def start(trial: Trial) -> dict:
+    return trial.wanted.values(trial.wanted.start)
+
+
 def least(trial: Trial, run: Run) -> float:
     body = trial.bodies[0]
     particles = Carried(body.body.rest, body.simulator)
@@ -37,7 +41,7 @@ def least(trial: Trial, run: Run) -> float:
 def test_a_grip_that_squeezes_nothing_flat_stays_firm():
     trial, theta = settled(1.0)
     history = []
-    chosen, run = handed_on(trial, trial.wanted.start, theta, history)
+    chosen, run = handed_on(trial, start(trial), theta, history)
     assert chosen.grip == 1.0
     assert least(chosen, run) > SQUEEZED
     assert history == []
@@ -45,10 +49,10 @@ def test_a_grip_that_squeezes_nothing_flat_stays_firm():
 
 def test_one_that_squeezes_tissue_too_far_gives_way_a_little(monkeypatch):
     trial, theta = settled(3.0)
-    firm, run = handed_on(trial, trial.wanted.start, theta, [])
+    firm, run = handed_on(trial, start(trial), theta, [])
     bound, history = least(firm, run) + 0.02, []
     monkeypatch.setattr(bearing, "SQUEEZED", bound)
-    chosen, run = handed_on(trial, trial.wanted.start, theta, history)
+    chosen, run = handed_on(trial, start(trial), theta, history)
     assert 0.3 < chosen.grip < 1.0
     assert least(chosen, run) >= bound
     assert "of its volume" in history[0]["broke"]
@@ -57,7 +61,7 @@ def test_one_that_squeezes_tissue_too_far_gives_way_a_little(monkeypatch):
 def test_one_that_turns_tissue_inside_out_gives_way_until_none_does():
     trial, theta = settled(6.0)
     history = []
-    chosen, run = handed_on(trial, trial.wanted.start, theta, history)
+    chosen, run = handed_on(trial, start(trial), theta, history)
     assert chosen.grip < 1.0
     assert least(chosen, run) >= SQUEEZED
     assert "inside out" in history[0]["broke"]
@@ -67,7 +71,7 @@ def test_a_pull_that_no_grip_bears_is_refused():
     trial, theta = settled(40.0)
     history = []
     with pytest.raises(Problem, match="however softly"):
-        handed_on(trial, trial.wanted.start, theta, history)
+        handed_on(trial, start(trial), theta, history)
     assert history[-1]["share"] < GRIPS[-1] / YIELDS
 
 
@@ -88,7 +92,7 @@ def test_of_what_squeezes_tissue_the_nearest_gives_way(hands_on):
     trial, theta = settled(1.0)
     trial = run_into_one_another(trial, 3.0 if hands_on else 6.0)
     x, history = trial.wanted.start, []
-    chosen, run = handed_on(trial, x, theta, history) if hands_on else borne(trial, x, history)
+    chosen, run = handed_on(trial, start(trial), theta, history) if hands_on else borne(trial, x, history)
     assert chosen.grip == 1.0
     assert len(history) == 1
     np.testing.assert_array_equal(chosen.motion.rim[-1], trial.motion.rim[-1])
