@@ -243,8 +243,8 @@ def descend(
 ) -> tuple[Trial, Solution]:  # fmt: skip
     """Gauss-Newton from x over windows that end at these frames, the last at the last fitted one.
 
-    What cannot be borne gives way from there on. jacobian: a derivative, (R, M), that is
-    nearly right there already, where there is but one window.
+    What cannot be borne gives way from there on. jacobian: a derivative, (R, M), that is nearly right there already,
+    where there is but one window.
     """
     wanted = trial.wanted
     for k, last in enumerate(ends):

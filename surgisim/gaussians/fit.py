@@ -107,7 +107,7 @@ class Fit:
             )
         loss.backward()
         if phase.moves_field and time == 0:
-            # The rest scene says nothing of the head, which forgets what it was told all the same.
+            # The rest scene says nothing of the head: its slope is zero, and its moments decay as ever.
             for name in self.head:
                 adam.tensors[name].grad = torch.zeros_like(adam.tensors[name])
         adam.advance(rate_at(iteration, self.settings.iterations, self.settings.rate_end))
