@@ -72,7 +72,11 @@ def replay(
             again = _recorded(motion, camera)
             path = _path(parts[0], again, physics, material, camera, per_frame)
             recorded = whole.run(theta, path).u
-        light = find_light(scene, camera, body.spacing, whole, recorded, *recording)
+
+        def picture(light: Light, u: np.ndarray) -> np.ndarray:
+            return Drawn(scene, rim, body, whole, settings.interior, light).picture(u, camera)
+
+        light = find_light(scene, camera, body.spacing, whole, recorded, *recording, picture)
         progress(0.5, 1.0, f"lamp: {light.words}")
     position, nodes, smallest, energy, rgb = [], [], [], [], []
     looks = {}

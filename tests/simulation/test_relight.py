@@ -12,6 +12,7 @@ from surgisim.artifacts.masks import Masks
 from surgisim.artifacts.scene import Scene
 from surgisim.gaussians.rim import beyond
 from surgisim.lighting.highlights import without
+from surgisim.lighting.response import Response
 from surgisim.lighting.strength import Strength
 from surgisim.mpm.carried import Carried
 from surgisim.mpm.setup import SKIN, prepare
@@ -52,29 +53,62 @@ def played():
     return made.simulator, run.u, scene
 
 
-def recorded(played, lamp):
-    """A recording of the pulled slab by itself, its used frames and one held out, under a lamp or under none."""
-    simulator, states, scene = played
+def picture(played, lamp, u):
+    """What the pulled slab by itself looks like under a lamp or under none."""
+    simulator, _, scene = played
     nothing = replace(scene, **{name: value[:0] for name, value in vars(scene).items()})
-    drawn = Drawn(scene, nothing, BODY, simulator, False, lamp)
+    return Drawn(scene, nothing, BODY, simulator, False, lamp).picture(u, CAMERA)
+
+
+def recorded(played, lamp):
+    """A recording of the pulled slab, its used frames and one held out."""
     split = np.zeros(FRAMES, np.uint8)
     split[1] = BETWEEN
-    rgb = np.stack([drawn.picture(u, CAMERA) for u in states])
+    rgb = np.stack([picture(played, lamp, u) for u in played[1]])
     noise = np.random.default_rng(1).normal(0, 2.0, rgb.shape)
     tool = np.zeros(rgb.shape[:3], bool)
     masks = Masks(tool, rgb.max(-1) > 20, tool, np.ones(FRAMES, np.float32))
     return Frames(np.clip(rgb + noise, 0, 255).astype(np.uint8), split), masks
 
 
-def found(played, lamp):
+def found(played, lamp, draw=None):
     simulator, states, scene = played
-    return find_light(scene, CAMERA, BODY.spacing, simulator, states, *recorded(played, lamp)).strength
+    draw = draw or (lambda lamp, u: picture(played, lamp, u))
+    return find_light(scene, CAMERA, BODY.spacing, simulator, states, *recorded(played, lamp), draw)
 
 
 def test_a_lamp_that_was_there_is_found_and_one_that_was_not_is_left_out(played):
-    lit, unlit = found(played, light(glint=SPECK & False)), found(played, None)
+    lit, unlit = found(played, light(glint=SPECK & False)).strength, found(played, None).strength
     assert 0.7 < lit.value < 1.3
     assert unlit.value < 0.15
+
+
+def answering():
+    """A lamp under which tissue beside the middle gets darker the farther it is lifted."""
+    weight = np.zeros((13, 17, 3))
+    weight[..., 2] = np.linspace(0.0, 1.6, 17)
+    span = np.stack([np.full((13, 17), -2.0), np.full((13, 17), 2.0)], -1)
+    return replace(light(glint=SPECK & False), response=Response(4.0, 0.004, weight, span, (1.0, 1.0)))
+
+
+def test_what_a_lamp_does_not_explain_is_learned_beside_it_and_makes_the_picture_better(played):
+    pulled_out = played[1][6]
+    wanted = picture(played, answering(), pulled_out).astype(float)
+    lamp = found(played, answering())
+    apart = [np.abs(picture(played, one, pulled_out) - wanted).mean() for one in (lamp, replace(lamp, response=None))]
+    assert lamp.response is not None
+    assert apart[0] < 0.4 * apart[1]
+
+
+def test_what_makes_the_pictures_worse_is_left_out(played):
+    """Tissue is not where its pictures are drawn: whatever its way shows there is another's."""
+
+    def worse(one, u):
+        return picture(played, answering(), u) * (0.2 if one.strength.value or one.response else 1.0)
+
+    lamp = found(played, answering(), worse)
+    assert lamp.strength.value == 0
+    assert lamp.response is None
 
 
 def test_without_motion_every_colour_stays():
