@@ -155,6 +155,7 @@ def estimate(
     x, history, table = trial.wanted.start, [], {}
     progress = _onward(progress)
     trial, run = borne(trial, x, history)
+    trial = trial.striding(x)
     default, edges = trial.stand(x)[0].observation, [trial]
     if trial.laying:
         edges, x = choose_support(trial, phase, history, progress)

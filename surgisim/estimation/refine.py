@@ -26,6 +26,9 @@ KEEPS = 0.6
 """Share of the last direction in the next."""
 STAYS = 1.0
 """How far around a place that broke tissue stays as it is, in grid cells."""
+FIRMEST = 8.0
+"""How many times stiffer than the uniform fit any part may become: beyond that it moves as one piece, and only makes
+every step of every run after it shorter."""
 PATIENCE = 3
 """Better fits in a row that do not fit the kept frames better after which no more are sought."""
 
@@ -84,7 +87,8 @@ def refine(
 
     def field(s: np.ndarray) -> np.ndarray:
         whole = theta.copy()
-        whole[:, columns] = np.clip(theta[:, columns] * np.exp(s), limits[0][columns], limits[1][columns])
+        most = np.minimum(limits[1][columns], FIRMEST * theta[:, columns])
+        whole[:, columns] = np.clip(theta[:, columns] * np.exp(s), limits[0][columns], most)
         return whole
 
     def tried(s: np.ndarray) -> _Tried:

@@ -39,6 +39,8 @@ MOVED = 0.9
 """Share of the misfit elsewhere below which a body is taken to be moved by what its edge is seen to do."""
 HEATS, FINALISTS = (2, 4), 2
 """Most iterations on the shape of a pull before its release is looked at: first with every edge, then with the best."""
+FAR = 0.95
+"""Share of its longest way from which a pull has shown its shape; what is seen later shows it again."""
 SETTLED = 4
 """Frames after a release that the first window must hold, or it says nothing of modulus and viscosity."""
 
@@ -167,6 +169,15 @@ def _driven(trial: Trial, phase: np.ndarray) -> int:
     return int(driven[-1]) if len(driven) else 0
 
 
+def _shown(trial: Trial, phase: np.ndarray) -> int:
+    """The first fitted frame before a release by which every grip has gone FAR of its longest way until there."""
+    last = _driven(trial, phase)
+    way = np.linalg.norm(trial.motion.position - trial.motion.center_rest[:, None], axis=-1)[:, : last + 1]
+    gone = way * trial.motion.active[:, : last + 1]
+    far = (gone >= FAR * gone.max(1, keepdims=True)).argmax(1).max(initial=0)
+    return int(trial.fitted[min(np.searchsorted(trial.fitted, far), len(trial.fitted) - 1)]) if last else 0
+
+
 def _cost(job: tuple[Trial, np.ndarray], worker: int = 0, *, last: int) -> float:
     """The misfit's share that counts, of a trial at x up to frame `last`; infinite where it cannot be simulated."""
     trial, x = job
@@ -187,7 +198,7 @@ def settle_pull(
     mend, and the wrong one looks as good as the right one. The first trial and x where there is nothing to fit.
     """
     wanted = trials[0].wanted
-    last = _driven(trials[0], phase)
+    last = _shown(trials[0], phase)
     slow = np.array([not name.endswith((".E", ".eta", ".release")) for name in wanted.names])
     if not last or not slow.any() or slow.all():
         return trials[0], x
@@ -250,7 +261,7 @@ def descend(
     for k, last in enumerate(ends):
         # What fits a window may turn the tissue inside out in the next.
         trial, _ = borne(trial, x, history, last)
-        solution = None
+        trial, solution = trial.striding(x, last), None
         while solution is None:
 
             def said(iteration, now, cost, k=k, last=last):

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from threading import Lock
@@ -25,6 +26,11 @@ from surgisim.physics.catalogue import choose
 WORKERS = 2
 SAFETY = 0.9
 """Share of the largest stable step that is used."""
+STRIDES = (1.4, 1.2)
+"""How many times that a search's runs may take, the longest first: what is beyond the stable step of tissue that is
+hardly strained is kept for what is squeezed and torn, and most clips do neither."""
+SAME = 0.01
+"""How far, as a share of what moves, a longer step may take nodes elsewhere."""
 REGIONS = 20
 """Parts of the tissue whose errors are taken to be independent of one another's."""
 
@@ -51,6 +57,8 @@ class Trial:
     """Where bodies come from that are laid anew as the search goes; none where `bodies` stay."""
     error: ModelError | None = None
     """What the simulation gets wrong although its numbers are right."""
+    stride: float = 1.0
+    """How many times SAFETY's step runs of the search take where they bear it, see STRIDES."""
     eased: float | None = None
     """Logarithm of how many times stiffer (softer, where negative) than at the search's start tissue is simulated
     whose pace nothing in the clip tells, whatever x says of it; None where x says it."""
@@ -158,12 +166,33 @@ class Trial:
         return np.concatenate([r, light.residual(u, frames).ravel()]) if light else r
 
     def _run(self, x: np.ndarray, worker: int, last: int | None) -> tuple[Run, Observation]:
+        return self._striding(lambda stride: self._at_stride(stride, x, worker, last))
+
+    def _at_stride(self, stride: float, x: np.ndarray, worker: int, last: int | None) -> tuple[Run, Observation]:
         values = self.values(x)
         here, motion = self.stand(x, worker)
-        drive = here.drive(values, motion=motion)
+        drive = here.drive(values, motion=motion, safety=SAFETY * stride)
         first = min(self.quiet, last or self.quiet)
         run = here.bodies[worker].simulator.run(here.theta(values), drive, first=first, last=last)
         return run.after(first), here.observation
+
+    def _striding(self, run: Callable[[float], Any]) -> Any:
+        """run(stride) at this trial's, or at the stable step where it breaks down."""
+        if self.stride > 1.0:
+            with suppress(Breakdown):
+                return run(self.stride)
+        return run(1.0)
+
+    def striding(self, x: np.ndarray, last: int | None = None) -> Self:
+        """This trial with the longest of STRIDES at which its run at x, up to frame `last`, is the same."""
+        until = None if last is None else self.until(last)
+        stable = self._at_stride(1.0, x, 0, until)[0].u
+        for stride in STRIDES:
+            with suppress(Breakdown):
+                u = self._at_stride(stride, x, 0, until)[0].u
+                if np.linalg.norm(u - stable) <= SAME * np.linalg.norm(stable):
+                    return replace(self, stride=stride)
+        return replace(self, stride=1.0)
 
     def closely(
         self, x: np.ndarray, since: int, last: int, within: int, worker: int = 0
@@ -172,13 +201,17 @@ class Trial:
         and what they are compared with."""
         values = self.values(x)
         here, motion = self.stand(x, worker)
-        steps = within * math.ceil(here.per_frame(values) / within)
-        drive = here.drive(values, per_frame=steps, motion=motion)
         simulator, theta, first = here.bodies[worker].simulator, here.theta(values), min(self.quiet, since)
-        before = simulator.run(theta, drive, first=first, last=since)
-        closer = replace(drive, per_frame=steps // within)
-        after = simulator.run(theta, closer, begin=before.state(-1), first=since * within, last=last * within)
-        return before.after(first).u, after.u, here.observation
+
+        def run(stride: float) -> tuple[np.ndarray, np.ndarray]:
+            steps = within * math.ceil(here.per_frame(values, safety=SAFETY * stride) / within)
+            drive = here.drive(values, per_frame=steps, motion=motion)
+            before = simulator.run(theta, drive, first=first, last=since)
+            closer = replace(drive, per_frame=steps // within)
+            after = simulator.run(theta, closer, begin=before.state(-1), first=since * within, last=last * within)
+            return before.after(first).u, after.u
+
+        return *self._striding(run), here.observation
 
     @cached_property
     def calm(self) -> bool:
