@@ -29,7 +29,7 @@ def doubts(
     """Of a fit with a body laid for it that ended at x, (M,), for every tracked point; zero where it is off the body.
 
     spread: standard deviation of what is open beside the laws, by its name, in search space. others: what the fit takes
-    for granted, changed by one standard deviation each.
+    for granted, changed by a part of a standard deviation each.
     """
     low, high = trial.wanted.bounds
     jobs: list[tuple[str, Trial, np.ndarray, View | None]] = [("", trial, x, None)]
@@ -49,7 +49,9 @@ def doubts(
             return None
 
     here, *there = at_once(of, jobs)
-    kept = [(name, way - here) for (name, *_), way in zip(jobs[1:], there, strict=True) if way is not None]
+    parts = [1.0] * (len(jobs) - 1 - len(others)) + [one.part for one in others]
+    each = zip(jobs[1:], there, parts, strict=True)
+    kept = [(name, (way - here) / part) for (name, *_), way, part in each if way is not None]
     moved = np.stack([way for _, way in kept]) if kept else np.zeros((0, *here.shape))
     return Doubts(np.array([name for name, _ in kept], dtype=str), moved.astype(np.float32))
 

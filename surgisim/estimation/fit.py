@@ -323,7 +323,7 @@ def _weighed(
     for a, share in table:
         history.append({"round": "otherwise", "about": a.one.about, "share": share, "misfit": number(a.cost)})
     shifts = {a.one.about: (a.x - solution.x, share) for a, share in table}
-    taken = [one for one in ask_here[1:] if not one.rival]
+    taken = [a.one for a in others if not a.one.rival]
     return trial, solution, {about: share * np.outer(d, d) for about, (d, share) in shifts.items()}, taken
 
 

@@ -54,6 +54,41 @@ def test_what_was_taken_for_granted_counts_whole():
         assert shares(solution, trial.wanted, [answer], REGION) == [1.0]
 
 
+@dataclass(frozen=True)
+class Broken(Linear):
+    """One that cannot be simulated."""
+
+    def residual(self, x, worker=0, last=None):
+        return None
+
+
+@pytest.mark.parametrize(("bears", "part"), [([-1.0], -1.0), ([-0.5, 0.25], -0.5), ([0.25], 0.25)])
+def test_where_a_whole_change_cannot_be_simulated_a_part_counts_as_much(bears, part):
+    trial, solution = fitted()
+    shift = np.array([0.3, 0.0, -0.2])
+
+    def changed(by):
+        there = away(trial, *(by * shift))
+        return Otherwise("slope", there if by in bears else Broken(**vars(there)), part=by, changed_by=changed)
+
+    [answer] = answers(solution, [changed(1.0)], silent, REGION)
+    [share] = shares(solution, trial.wanted, [answer], REGION)
+    off = answer.x - solution.x
+    assert answer.one.part == part
+    assert share * np.outer(off, off) == pytest.approx(np.outer(shift, shift), rel=0.05, abs=1e-3)
+
+
+def test_what_no_part_of_can_be_simulated_says_nothing():
+    trial, solution = fitted()
+
+    def changed(by):
+        return Otherwise("slope", Broken(**vars(trial)), part=by, changed_by=changed)
+
+    [answer] = answers(solution, [changed(1.0)], silent, REGION)
+    assert answer.residual is None
+    assert np.array_equal(answer.x, solution.x)
+
+
 def test_a_misfit_says_less_of_rivals_where_regions_pull_the_numbers_apart():
     trial, _ = fitted()
     noise = np.random.default_rng(3).normal(size=COUNT)
