@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from slab import pulled
 
 from surgisim.estimation.observation import PHASES
 from surgisim.estimation.rounds import settle_pull
@@ -25,6 +26,7 @@ def edge(ratio: float, stays: float) -> SimpleNamespace:
     return SimpleNamespace(
         wanted=WANTED,
         laying=None,
+        motion=pulled(20),
         differences=WANTED.differences,
         fitted=np.arange(1, 20),
         residual=residual,
