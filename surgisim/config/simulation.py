@@ -17,7 +17,8 @@ class Simulation(Settings):
     interior: bool = True
     """Whether to draw the thickened interior where the surface opens: in a cut, or behind a flap that moves [-]."""
     relight: bool = True
-    """Whether shading and highlights follow the moved surface under a lamp at the camera, or ride on the tissue [-]."""
+    """Whether shading and highlights follow the moved surface under a lamp at the camera, as far as that makes
+    pictures of the recording nearer, or ride on the tissue [-]."""
     refine_step: int = Field(1, ge=1, le=100)
     """Divide the step that travels with the parameters by this, to see that the answer does not depend on it [-]."""
     device: Literal["cpu", "cuda"] = "cpu"
