@@ -39,8 +39,9 @@ MOVED = 0.9
 """Share of the misfit elsewhere below which a body is taken to be moved by what its edge is seen to do."""
 HEATS, FINALISTS = (2, 4), 2
 """Most iterations on the shape of a pull before its release is looked at: first with every edge, then with the best."""
-FAR = 0.95
-"""Share of its longest way from which a pull has shown its shape; what is seen later shows it again."""
+FAR, LAGS = 0.95, 3
+"""Share of its longest way from which a pull has shown its shape, and fitted frames more, in which tissue that lags comes
+along; what is seen later shows it again."""
 SETTLED = 4
 """Frames after a release that the first window must hold, or it says nothing of modulus and viscosity."""
 
@@ -170,12 +171,12 @@ def _driven(trial: Trial, phase: np.ndarray) -> int:
 
 
 def _shown(trial: Trial, phase: np.ndarray) -> int:
-    """The first fitted frame before a release by which every grip has gone FAR of its longest way until there."""
+    """The fitted frame before a release by which every grip has gone FAR of its longest way, and LAGS more."""
     last = _driven(trial, phase)
     way = np.linalg.norm(trial.motion.position - trial.motion.center_rest[:, None], axis=-1)[:, : last + 1]
     gone = way * trial.motion.active[:, : last + 1]
     far = (gone >= FAR * gone.max(1, keepdims=True)).argmax(1).max(initial=0)
-    return int(trial.fitted[min(np.searchsorted(trial.fitted, far), len(trial.fitted) - 1)]) if last else 0
+    return int(min(last, trial.fitted[min(np.searchsorted(trial.fitted, far) + LAGS, len(trial.fitted) - 1)]))
 
 
 def _cost(job: tuple[Trial, np.ndarray], worker: int = 0, *, last: int) -> float:

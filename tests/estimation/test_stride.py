@@ -8,7 +8,7 @@ from slab import pulled, slab
 from slab_clip import FPS, TRUE, T
 
 from surgisim.estimation.observation import phases
-from surgisim.estimation.rounds import FAR, _driven, _shown
+from surgisim.estimation.rounds import FAR, LAGS, _driven, _shown
 from surgisim.estimation.search import search
 from surgisim.estimation.trial import SAME, STRIDES, Trial
 from surgisim.mpm.setup import SKIN, prepare
@@ -57,11 +57,18 @@ def test_where_it_shakes_it_is_not_taken(trial, monkeypatch):
 
 
 def test_a_pull_has_shown_its_shape_once_it_has_gone_its_way(trial):
+    held_on = replace(trial, motion=pulled(frames=T, hold=T))
+    way = np.linalg.norm(held_on.motion.position[0] - held_on.motion.center_rest[0], axis=-1)
+    far = int(np.argmax(way >= FAR * way.max()))
+    assert _shown(held_on, phases(held_on.motion, T)) == far + LAGS < T - 1
+    every_third = replace(held_on, fitted=np.arange(1, T, 3))
+    shown = _shown(every_third, phases(held_on.motion, T))
+    assert shown in every_third.fitted
+    assert far + 3 * LAGS <= shown < far + 3 * (LAGS + 1)
+
+
+def test_what_comes_after_a_release_is_no_pull(trial):
     phase = phases(trial.motion, T)
-    way = np.linalg.norm(trial.motion.position[0] - trial.motion.center_rest[0], axis=-1)
-    shown = _shown(trial, phase)
-    assert way[shown - 1] < FAR * way.max() <= way[shown]
-    assert shown < _driven(trial, phase)
-    every_third = replace(trial, fitted=np.arange(1, T, 3))
-    assert _shown(every_third, phase) in every_third.fitted
-    assert _shown(every_third, phase) >= shown
+    assert _shown(trial, phase) <= _driven(trial, phase)
+    never = replace(trial, fitted=np.arange(12, T))
+    assert _shown(never, phase) == _driven(never, phase) == 0
