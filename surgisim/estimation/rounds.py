@@ -40,8 +40,8 @@ MOVED = 0.9
 HEATS, FINALISTS = (2, 4), 2
 """Most iterations on the shape of a pull before its release is looked at: first with every edge, then with the best."""
 FAR, LAGS = 0.95, 3
-"""Share of its longest way from which a pull has shown its shape, and fitted frames more, in which tissue that lags comes
-along; what is seen later shows it again."""
+"""Share of its longest way from which a pull has shown its shape, and fitted frames more, in which tissue that lags
+comes along; what is seen later shows it again."""
 SETTLED = 4
 """Frames after a release that the first window must hold, or it says nothing of modulus and viscosity."""
 
