@@ -52,12 +52,12 @@ class Light:
     ambient: float
     lobe: float
     response: Response | None = None
-    """What tissue's brightness does beside, where it moves; None where that was not asked."""
+    """What tissue's brightness does beside, where it moves; None where that is left aside."""
 
     @property
     def words(self) -> str:
         s = self.strength
-        beside = self.response.words if self.response else "not asked"
+        beside = self.response.words if self.response else "nothing"
         return (
             f"slope {s.slope:.2f} +- {s.error:.2f}, applied {s.value:.2f}, ambient share {self.ambient:g}, "
             f"highlights' lobe {self.lobe:g}; beyond the lamp: {beside}"
