@@ -128,12 +128,12 @@ def find_light(
     gone = np.stack(way.moved, 1) - way.rest[:, None]
     seen &= way.in_front(spacing)
     lights = []
-    for value in (0.0, strength.value):
+    for value in dict.fromkeys((0.0, strength.value)):
         left = recorded - value * way.change(ambient) - strength.gain
         response = fit_response(pixels, stride, cell, gone, left, seen & np.isfinite(left))
         lamp = replace(strength, value=value)
         plain = Light(camera, normals, without(rest, glint), glint, lamp, ambient, 0.0)
-        lights += [plain, replace(plain, response=response)]
+        lights += [plain, replace(plain, response=response)][: 1 if response.choice is None else 2]
     judged = way.farthest(JUDGED)
     error = np.zeros((len(lights), len(judged)))
     for k, j in enumerate(judged):
