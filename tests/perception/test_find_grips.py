@@ -78,3 +78,14 @@ def test_frames_that_come_twice_do_not_break_a_grip():
 def test_a_small_pull_is_found_too():
     (grip,) = grips(Pull((127, 40), (70, 50), course(T, 8, 24, (4, -1.5)), ALWAYS))
     assert np.linalg.norm(grip.center - (70, 50)) < 6
+
+
+def test_soft_tissue_that_comes_along_as_one_is_held_where_it_springs_back_without_the_jaws():
+    way = course(T, 8, 18, (14, 4))
+    (grip,) = grips(Pull((127, 40), (70, 50), way, between(6, 28)), reach=80.0)
+    assert grip.end == 28
+
+
+def test_a_camera_that_turns_with_its_instrument_at_rest_shows_no_grip():
+    pan = course(T, 8, 18, (14, 4)) - course(T, 28, 30, (14, 4))
+    assert not grips(Pull((127, 40), (70, 50), pan, ALWAYS), reach=1500.0)

@@ -186,3 +186,11 @@ def test_sam2_draws_the_instrument_it_is_shown(shared):
     weights = {w: shared / f"weights/sam2_hiera_tiny_{w}_w8.onnx" for w in ("encoder", "decoder")}
     rgb, tool = operated(2, (240, 300))
     assert overlap(masked(rgb, backend="sam2", **weights).tool, tool) > 0.85
+
+
+def test_smoke_beside_the_instrument_is_not_taken_for_it():
+    rgb, tool = operated(8, SIZE)
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    smoke = 0.75 * np.exp(-(((x - 30) / 45.0) ** 2 + ((y - 70) / 40.0) ** 2))[..., None]
+    veiled = np.where(tool[..., None], rgb, (1 - smoke) * rgb + smoke * 150).astype(np.uint8)
+    assert overlap(masked(veiled).tool, tool) > 0.85

@@ -11,7 +11,7 @@ import numpy as np
 
 from surgisim.perception.grasp.contact import distance
 from surgisim.perception.grasp.following import AROUND, Following, following, jaw_motion
-from surgisim.perception.grasp.holding import began, held, let_go, recoiled
+from surgisim.perception.grasp.holding import began, held, let_go, recoiled, springs_back
 from surgisim.perception.grasp.instruments import Instrument
 from surgisim.perception.grasp.jaw_tissue import just_hidden, leading
 
@@ -94,7 +94,8 @@ def _grip(
     far = np.linalg.norm(course - course[begin], axis=-1)[begin : end + 1]
     top = begin + int(far.argmax())
     radius = _radius(start, xy[:, top] - xy[:, begin], center, side, cell)
-    confidence = _confidence(xy, seen, at_jaws, follows, (begin, top, end), side)
+    alone = springs_back(course, follows, tool.tip, begin, end)
+    confidence = _confidence(xy, seen, at_jaws, follows, (begin, top, end), side, alone)
     return Grip(center, radius, begin, end, confidence, float(far.max())), course
 
 
@@ -130,8 +131,11 @@ def _radius(start, moved: np.ndarray, center: np.ndarray, side: int, cell: float
     return float(np.clip(np.sqrt(area / np.pi), SMALL * side, REACH * side))
 
 
-def _confidence(xy, seen, at_jaws, follows: Following, times: tuple[int, int, int], side: int) -> float:
-    """How sure it is that this is a grip, 0-1: far enough, together, and with the tissue straining about it."""
+def _confidence(xy, seen, at_jaws, follows: Following, times: tuple[int, int, int], side: int, alone: bool) -> float:
+    """How sure it is that this is a grip, 0-1: far enough, together, and not as a camera that moves would show it.
+
+    Then all goes alike, and the jaws with it: here tissue strains about the grip, or springs back without the jaws.
+    """
     begin, top, end = times
     told = np.isfinite(follows.agreement[begin:end])
     weight = np.where(told, follows.way[begin:end], 0.0)
@@ -145,7 +149,7 @@ def _confidence(xy, seen, at_jaws, follows: Following, times: tuple[int, int, in
     here = float(np.quantile(moved[near], 0.75)) if near.any() else 0.0
     there = float(np.median(moved[rest])) if rest.sum() > 10 else 0.0
     size = 1 - np.exp(-here / (WORTH * side))
-    strain = np.clip(1.5 * (1 - there / max(here, 1e-9)), 0.0, 1.0)
+    strain = 1.0 if alone else np.clip(1.5 * (1 - there / max(here, 1e-9)), 0.0, 1.0)
     return float(np.clip(size * np.clip(1.5 * together, 0, 1) * strain * (0.5 + 0.5 * min(1.0, 4 * told.mean())), 0, 1))
 
 

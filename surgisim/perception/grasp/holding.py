@@ -81,14 +81,20 @@ def recoiled(course: np.ndarray, follows: Following, tip: np.ndarray, begin: int
     """The last frame before tissue springs back without the jaws; `end` where it does not.
 
     course: where the tissue at the jaws is carried [px], (T, 2), held from `begin` to `end` as far as is known. tip:
-    where the instrument ends [px], NaN where it is not seen, (T, 2). Jaws open slowly, and stand or draw back near the
-    place where tissue has left them: that it goes back alone says when. Tissue that rushes by drags the flow of the
-    jaws along, an outline it does not; so either may say it.
+    where the instrument ends [px], NaN where it is not seen, (T, 2).
     """
-    way = course - course[begin]
-    top = begin + int(np.linalg.norm(way[begin : end + 1], axis=-1).argmax())
-    share = way @ way[top] / max(way[top] @ way[top], 1e-9)
+    share = _share(course, begin, end)
     last = begin + int(np.flatnonzero(share[begin : end + 1] >= AWAY)[-1])
+    return last if springs_back(course, follows, tip, begin, last) else end
+
+
+def springs_back(course: np.ndarray, follows: Following, tip: np.ndarray, begin: int, last: int) -> bool:
+    """Whether tissue held from `begin` on goes back most of its way soon after `last`, and goes alone.
+
+    Jaws open slowly, and stand or draw back near the place where tissue has left them: that it goes back alone says
+    when. Tissue that rushes by drags the flow of the jaws along, an outline it does not; so either may say it.
+    """
+    share = _share(course, begin, last)
     after = min(last + QUICK, len(course) - 1)
     back, jaws = course[after] - course[last], follows.jaws[last:after]
     ways = [tip[after] - tip[last]]
@@ -96,4 +102,11 @@ def recoiled(course: np.ndarray, follows: Following, tip: np.ndarray, begin: int
         # In a frame in which the jaws are not seen they go as in the others.
         ways.append((after - last) * np.nanmean(jaws, axis=0))
     alone = any(np.linalg.norm(back - way) > PARTLY * np.linalg.norm(back) for way in ways if np.isfinite(way).all())
-    return last if alone and share[last] - share[after] > FALL else end
+    return bool(alone and share[last] - share[after] > FALL)
+
+
+def _share(course: np.ndarray, begin: int, end: int) -> np.ndarray:
+    """How far along the farthest way from `begin` to `end` tissue is in each frame, as a share of it, (T,)."""
+    way = course - course[begin]
+    top = begin + int(np.linalg.norm(way[begin : end + 1], axis=-1).argmax())
+    return way @ way[top] / max(way[top] @ way[top], 1e-9)

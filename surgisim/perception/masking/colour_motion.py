@@ -28,6 +28,9 @@ BRIGHT, BURNT = 215, 240
 """Brightest channel from which a camera compresses it; from which it is lost [0-255]."""
 REDDISH = 0.03
 """Logarithm of red over green above which a bright surface is not white."""
+MOSTLY = 0.6
+"""Least share of what is found that is not red either: where smoke is as grey as steel, colours learned from one lead to
+the other, more of it each round, and none that was learned is used."""
 
 
 def tool(frames: Frames, given: Given, settings: Masking, progress) -> tuple[np.ndarray, np.ndarray]:
@@ -46,13 +49,17 @@ def tool(frames: Frames, given: Given, settings: Masking, progress) -> tuple[np.
         found = entering(whole, prior, shine, marked > 6)
         return np.stack([bridged(m, s) for m, s in zip(found, smooth, strict=True)]) & inside & (marked > -6)
 
-    evidence = prior
+    evidence, found = prior, regions(prior)
     for turn in range(ROUNDS):
-        progress((0.5 + 0.4 * turn / ROUNDS) * total, total, "learning its colours")
-        found = regions(evidence)
         if not found.any():
             return found, np.zeros(total)
-        evidence = 0.3 * prior + _by_colour(bins, found, inside) + marked
+        progress((0.5 + 0.4 * turn / ROUNDS) * total, total, "learning its colours")
+        learned = 0.3 * prior + _by_colour(bins, found, inside) + marked
+        shown = regions(learned)
+        if (prior[shown] > 0).sum() < MOSTLY * shown.sum():
+            evidence = prior
+            break
+        evidence, found = learned, shown
     evidence = _shared_in_time(evidence, motion)
     found = regions(evidence)
     if settings.refine:
