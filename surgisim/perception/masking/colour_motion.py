@@ -29,8 +29,8 @@ BRIGHT, BURNT = 215, 240
 REDDISH = 0.03
 """Logarithm of red over green above which a bright surface is not white."""
 MOSTLY = 0.6
-"""Least share of what is found that is not red either: where smoke is as grey as steel, colours learned from one lead to
-the other, more of it each round, and none that was learned is used."""
+"""Least share of what is found that is not red either. Where smoke is as grey as steel, colours learned from one lead
+to the other, more of it each round; none that was learned is used then. What a user marks may be of any colour."""
 
 
 def tool(frames: Frames, given: Given, settings: Masking, progress) -> tuple[np.ndarray, np.ndarray]:
@@ -56,7 +56,7 @@ def tool(frames: Frames, given: Given, settings: Masking, progress) -> tuple[np.
         progress((0.5 + 0.4 * turn / ROUNDS) * total, total, "learning its colours")
         learned = 0.3 * prior + _by_colour(bins, found, inside) + marked
         shown = regions(learned)
-        if (prior[shown] > 0).sum() < MOSTLY * shown.sum():
+        if not settings.clicks and (prior[shown] > 0).sum() < MOSTLY * shown.sum():
             evidence = prior
             break
         evidence, found = learned, shown
