@@ -14,6 +14,7 @@ import numpy as np
 
 from surgisim.artifacts.motion import Motion
 from surgisim.estimation.rounds import cost_of, number, plain
+from surgisim.estimation.search import Search
 from surgisim.estimation.trial import Trial, at_once
 from surgisim.mpm.grip import runs
 from surgisim.mpm.simulator import Breakdown
@@ -31,6 +32,10 @@ WITHIN = 4
 """States kept between two frames, to read a swing at another pace."""
 SIMULATED = 5
 """How many of the likeliest starts are simulated."""
+APART = 0.35
+"""Logarithm of how many times stiffer a start is from which it lies in another valley: a fifth faster, or more."""
+RIVALS = 1.1
+"""Times the cost of the best start up to which that of another valley may yet end lower."""
 
 Say = Callable[[float, float, str], None]
 
@@ -50,22 +55,22 @@ class Freed:
         return max(0, int(self.let_go + min(OPENING)))
 
 
-def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np.ndarray:
-    """The best of many starting points: what shapes a pull as in `begin`, (M,), what paces a swing as tried.
+def choose_starts(trial: Trial, begin: np.ndarray, history: list, say: Say) -> list[np.ndarray]:
+    """The best of many starting points, and the best of another valley where it is about as good.
 
-    A ring-down misfits by whole periods: from a modulus a few times too high, a descent ends there. Raises Breakdown
-    where not one of the likeliest can be simulated.
+    What shapes a pull is as in `begin`, (M,), what paces a swing as tried. A ring-down misfits by whole periods: from a
+    modulus a few times too high, a descent ends there. Raises Breakdown where none of the likeliest can be simulated.
     """
     wanted = trial.wanted
     begin = np.where(wanted.paces, wanted.start, begin)
     if trial.eased is not None:
-        return begin
+        return [begin]
     free = freed(wanted.motion(begin, trial.motion), trial.frames)
     if free:
         say(0.13, 1.0, f"reading {len(SOFTER)} moduli off each of {len(DAMPING)} ring-downs")
         read = at_once(lambda damping, worker: list(valleys(trial, begin, damping, free, worker)), list(DAMPING))
-        found = sorted(itertools.chain(*read), key=lambda start: start[0])[:SIMULATED]
-        points = [x for _, x in found]
+        found = [x for _, x in sorted(itertools.chain(*read), key=lambda start: start[0])]
+        points = _of_each_valley(found, wanted)[:SIMULATED]
     if not free or not points:
         points = [np.clip(wanted.paced(begin, 0.0, damping), *wanted.bounds) for damping in DAMPING]
     say(0.2, 1.0, f"simulating {len(points)} starts")
@@ -79,7 +84,18 @@ def choose_start(trial: Trial, begin: np.ndarray, history: list, say: Say) -> np
             "estimation: the body turns inside out under the recorded motion at every start. Check the grip and its "
             "path (tracking), or start from other values (estimation.start)."
         )
-    return points[int(np.argmin(costs))]
+    near = [points[k] for k in np.argsort(costs) if costs[k] <= RIVALS * min(costs)]
+    best, *others = _of_each_valley(near, wanted)
+    return [best, *(x for x in others[:1] if wanted.stiffer(x, best) > APART)]
+
+
+def _of_each_valley(points: list[np.ndarray], wanted: Search) -> list[np.ndarray]:
+    """Points (M,), the first of every valley before all others."""
+    first: list[np.ndarray] = []
+    for x in points:
+        if all(wanted.stiffer(x, other) > APART for other in first):
+            first.append(x)
+    return first + [x for x in points if not any(x is one for one in first)]
 
 
 def freed(motion: Motion, frames: int) -> Freed | None:

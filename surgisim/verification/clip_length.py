@@ -20,7 +20,7 @@ from surgisim.config.estimation import Estimation
 from surgisim.estimation.observation import observe, phases
 from surgisim.estimation.rounds import descend, windows
 from surgisim.estimation.search import search
-from surgisim.estimation.starts import choose_start
+from surgisim.estimation.starts import choose_starts
 from surgisim.estimation.trial import Trial
 from surgisim.mpm.setup import prepare
 from surgisim.verification.drawing import COLORS, panels
@@ -48,7 +48,7 @@ def fit(frames: int) -> dict:
     """One search: processor time [s], frames simulated, and what was found."""
     planted, ledger = trial(frames)
     wanted, settings, begun = planted.wanted, Estimation(first_window=0.25, field_iterations=0), time.process_time()
-    begin = choose_start(planted, wanted.start, [], lambda *_: None)
+    begin = choose_starts(planted, wanted.start, [], lambda *_: None)[0]
     ends = windows(planted.fitted, phases(planted.motion, frames), settings.first_window)
     _, solution = descend(planted, begin, ends, settings, [], lambda *_: None)
     seconds = time.process_time() - begun

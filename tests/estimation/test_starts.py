@@ -5,8 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from surgisim.estimation import fit
 from surgisim.estimation.search import search
-from surgisim.estimation.starts import WITHIN, Freed, at_pace, choose_start, freed
+from surgisim.estimation.starts import WITHIN, Freed, _of_each_valley, at_pace, choose_starts, freed
+from surgisim.mpm.simulator import Breakdown
 from surgisim.verification import clip_length
 
 
@@ -49,7 +51,47 @@ def test_another_pace_keeps_what_a_swing_dies_off_by():
 def test_the_start_lies_in_the_planted_modulus_own_valley():
     trial, _ = clip_length.trial(2 * clip_length.PERIOD)
     history = []
-    x = choose_start(trial, trial.wanted.start, history, lambda *_: None)
+    x = choose_starts(trial, trial.wanted.start, history, lambda *_: None)[0]
     found = trial.wanted.values(x)
     assert found["corotated"]["E"] == pytest.approx(clip_length.TRUE["corotated"]["E"], rel=0.25)
     assert all(h["round"] == "start" for h in history)
+
+
+def test_of_every_valley_one_start_comes_before_seconds_of_any():
+    wanted = search(["corotated", "newtonian"], {}, [])
+    at = [wanted.paced(wanted.start, modulus, damping) for modulus, damping in ((0, 0), (0.1, 0.6), (-2, 0), (-2.1, 1))]
+    found = _of_each_valley(at, wanted)
+    assert [next(k for k, x in enumerate(at) if x is f) for f in found] == [0, 2, 1, 3]
+    assert wanted.stiffer(at[0], at[1]) == pytest.approx(0.1)
+    assert wanted.stiffer(at[2], at[0]) == pytest.approx(2.0)
+
+
+def ends(costs: dict[float, float | None]):
+    """A descent that ends at these costs for starts of these stiffnesses, None where it breaks."""
+
+    def descend(trial, x, ends, settings, rows, say):
+        cost = costs[float(x[0])]
+        if cost is None:
+            raise Breakdown("broken")
+        rows.append({"round": 0, "cost": cost})
+        return trial, SimpleNamespace(x=x, residual=cost)
+
+    return descend
+
+
+@pytest.mark.parametrize(("costs", "lowest"), [((9.0, 4.0), 1), ((4.0, 9.0), 0), ((9.0, None), 0)])
+def test_the_valley_that_ends_lowest_is_taken_and_the_others_are_told_as_rivals(monkeypatch, costs, lowest):
+    monkeypatch.setattr(fit, "descend", ends(dict(zip((0.0, 1.0), costs, strict=True))))
+    monkeypatch.setattr(fit, "cost_of", lambda r, x, wanted: r)
+    history = []
+    starts = [np.array([0.0]), np.array([1.0])]
+    _, solution = fit._lowest(SimpleNamespace(wanted=None), starts, [5], None, history, None)
+    assert solution.x is starts[lowest]
+    assert [h["cost"] for h in history if h["round"] == 0] == [costs[lowest]]
+    assert len(history) == sum(c is not None for c in costs)
+
+
+def test_a_start_that_has_no_rival_and_breaks_is_said_to_break(monkeypatch):
+    monkeypatch.setattr(fit, "descend", ends({0.0: None}))
+    with pytest.raises(Breakdown):
+        fit._lowest(SimpleNamespace(wanted=None), [np.array([0.0])], [5], None, [], None)

@@ -9,7 +9,7 @@ from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.observation import Observation, phases
 from surgisim.estimation.rounds import descend, windows
 from surgisim.estimation.search import search
-from surgisim.estimation.starts import choose_start
+from surgisim.estimation.starts import choose_starts
 from surgisim.estimation.trial import WORKERS, Trial, at_once
 from surgisim.mpm.setup import Values, prepare
 from surgisim.phantom.elements import elements
@@ -86,7 +86,7 @@ def fitted(
     """
     rough, fine = (trial(scene, h, seen, split, last, noise=noise, seed=seed) for h in (COARSER * spacing, spacing))
     phase, settings = phases(fine.motion, fine.frames), Estimation(iterations=6, first_window=1.0)
-    begin = choose_start(rough, rough.wanted.start, [], lambda *_: None)
+    begin = choose_starts(rough, rough.wanted.start, [], lambda *_: None)[0]
     return descend(fine, begin, windows(fine.fitted, phase, settings.first_window), settings, [], lambda *_: None)
 
 
