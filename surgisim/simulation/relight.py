@@ -114,11 +114,7 @@ def find_light(
     stride = max(cell / 2, 1.0)
     pixels = _grid(masks.tissue[0], stride)
     way = _Way(pixels, surface.z, normals, camera, simulator, used, stride)
-    light = [shown(t, at, frames, masks, BLUR * cell) for (t, _), at in zip(used, way.pixels, strict=True)]
-    start = light[0]
-    recorded = np.stack([np.log(np.maximum(a, 1e-6)).mean(-1) for a, _ in light], 1)
-    recorded = recorded - np.log(np.maximum(start[0], 1e-6)).mean(-1)[:, None]
-    seen = np.stack([known for _, known in light], 1) & start[1][:, None]
+    recorded, seen = _recorded(way, used, frames, masks, BLUR * cell)
     patch = np.floor(pixels / (PATCH * cell)).astype(int)
     cluster = patch[:, 1] * (patch[:, 0].max(initial=0) + 1) + patch[:, 0]
     fits = [(a, fit_strength(way.change(a), recorded, seen, cluster)) for a in AMBIENT]
@@ -134,15 +130,7 @@ def find_light(
         lamp = replace(strength, value=value)
         plain = Light(camera, normals, without(rest, glint), glint, lamp, ambient, 0.0)
         lights += [plain, replace(plain, response=response)][: 1 if response.choice is None else 2]
-    judged = way.farthest(JUDGED)
-    error = np.zeros((len(lights), len(judged)))
-    for k, j in enumerate(judged):
-        t, u = used[j]
-        # Where nothing moves all of them draw the same.
-        here = masks.tissue[t] & ~beside(masks.specular[t]) & way.moving(j, masks.tissue.shape[1:], cell)
-        for n, light in enumerate(lights):
-            error[n, k] = (((picture(light, u) - frames.rgb[t].astype(float))[here] / 255) ** 2).sum()
-    best = lights[mildest(tuple(range(len(lights))), error)]
+    best = _nearest(lights, picture, way, used, frames, masks, cell)
     return _with_highlights(best, rest, surface.z, simulator, used, frames, masks)
 
 
@@ -185,6 +173,27 @@ class _Way:
         return np.stack(
             [log_brightness_change(self.rest, self.normal, m, turned(F, self.normal), ambient) for m, F in each], 1
         )
+
+
+def _recorded(way: _Way, used, frames, masks, blur: float) -> tuple[np.ndarray, np.ndarray]:
+    """Change of log brightness along the way since the first used frame, and where it is known, (K, T) each."""
+    light = [shown(t, at, frames, masks, blur) for (t, _), at in zip(used, way.pixels, strict=True)]
+    level = np.stack([np.log(np.maximum(brightness, 1e-6)).mean(-1) for brightness, _ in light], 1)
+    known = np.stack([known for _, known in light], 1)
+    return level - level[:, :1], known & known[:, :1]
+
+
+def _nearest(lights: list[Light], picture, way: _Way, used, frames, masks, cell: float) -> Light:
+    """The light whose pictures are nearest to frames in which tissue has gone far; of about as near ones the first."""
+    judged = way.farthest(JUDGED)
+    error = np.zeros((len(lights), len(judged)))
+    for k, j in enumerate(judged):
+        t, u = used[j]
+        # Where nothing moves all of them draw the same.
+        here = masks.tissue[t] & ~beside(masks.specular[t]) & way.moving(j, masks.tissue.shape[1:], cell)
+        for n, light in enumerate(lights):
+            error[n, k] = (((picture(light, u) - frames.rgb[t].astype(float))[here] / 255) ** 2).sum()
+    return lights[mildest(tuple(range(len(lights))), error)]
 
 
 def _with_highlights(plain: Light, rest, z, simulator, used, frames, masks) -> Light:
