@@ -36,6 +36,8 @@ APART = 0.35
 """Logarithm of how many times stiffer a start is from which it lies in another valley: a fifth faster, or more."""
 RIVALS = 1.1
 """Times the cost of the best start up to which that of another valley may yet end lower."""
+FOLLOWED = 2
+"""How many other valleys are followed at most."""
 
 Say = Callable[[float, float, str], None]
 
@@ -56,7 +58,7 @@ class Freed:
 
 
 def choose_starts(trial: Trial, begin: np.ndarray, history: list, say: Say) -> list[np.ndarray]:
-    """The best of many starting points, and the best of another valley where it is about as good.
+    """The best of many starting points, and those of other valleys that are about as good.
 
     What shapes a pull is as in `begin`, (M,), what paces a swing as tried. A ring-down misfits by whole periods: from a
     modulus a few times too high, a descent ends there. Raises Breakdown where none of the likeliest can be simulated.
@@ -70,7 +72,7 @@ def choose_starts(trial: Trial, begin: np.ndarray, history: list, say: Say) -> l
         say(0.13, 1.0, f"reading {len(SOFTER)} moduli off each of {len(DAMPING)} ring-downs")
         read = at_once(lambda damping, worker: list(valleys(trial, begin, damping, free, worker)), list(DAMPING))
         found = [x for _, x in sorted(itertools.chain(*read), key=lambda start: start[0])]
-        points = _of_each_valley(found, wanted)[:SIMULATED]
+        points = list(itertools.chain(*_of_each_valley(found, wanted)))[:SIMULATED]
     if not free or not points:
         points = [np.clip(wanted.paced(begin, 0.0, damping), *wanted.bounds) for damping in DAMPING]
     say(0.2, 1.0, f"simulating {len(points)} starts")
@@ -85,17 +87,17 @@ def choose_starts(trial: Trial, begin: np.ndarray, history: list, say: Say) -> l
             "path (tracking), or start from other values (estimation.start)."
         )
     near = [points[k] for k in np.argsort(costs) if costs[k] <= RIVALS * min(costs)]
-    best, *others = _of_each_valley(near, wanted)
-    return [best, *(x for x in others[:1] if wanted.stiffer(x, best) > APART)]
+    return _of_each_valley(near, wanted)[0][: 1 + FOLLOWED]
 
 
-def _of_each_valley(points: list[np.ndarray], wanted: Search) -> list[np.ndarray]:
-    """Points (M,), the first of every valley before all others."""
+def _of_each_valley(points: list[np.ndarray], wanted: Search) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Of points (M,) the first of every valley, and all others."""
     first: list[np.ndarray] = []
+    others: list[np.ndarray] = []
     for x in points:
-        if all(wanted.stiffer(x, other) > APART for other in first):
-            first.append(x)
-    return first + [x for x in points if not any(x is one for one in first)]
+        new = all(wanted.stiffer(x, one) > APART for one in first)
+        (first if new else others).append(x)
+    return first, others
 
 
 def freed(motion: Motion, frames: int) -> Freed | None:
