@@ -50,8 +50,8 @@ from surgisim.estimation.rounds import (
     ask_rim,
     at_ease,
     choose_support,
-    cost_of,
     descend,
+    lowest,
     number,
     settle_pull,
     windows,
@@ -64,7 +64,6 @@ from surgisim.estimation.trial import WORKERS, Trial
 from surgisim.estimation.written import physics_of, unfitted
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
-from surgisim.mpm.simulator import Breakdown
 from surgisim.physics.catalogue import choose, columns
 from surgisim.physics.place import Place
 from surgisim.problem import Problem
@@ -175,7 +174,7 @@ def estimate(
     if searched:
         starts = choose_starts(trial, x, history, progress)
         ends = windows(fitted, phase, settings.first_window)
-        trial, solution = _lowest(trial, starts, ends, settings, history, progress)
+        trial, solution = lowest(trial, starts, ends, settings, history, progress)
         model: dict[str, np.ndarray] = {}
         open_beside: list[Otherwise] = []
         if trial.laying:
@@ -251,32 +250,6 @@ def estimate(
     material = Material(names, theta.astype(np.float32), trial.held)
     physics = physics_of(prepared, values, table, settings, path.step, trial.grip)
     return Estimate(material, physics, fit, trial.motion, laid, unsure)
-
-
-def _lowest(
-    trial: Trial, starts: list[np.ndarray], ends: list[int], settings: Estimation, history: list, say: Say
-) -> tuple[Trial, Solution]:
-    """The descent that ends lowest, of one from every start; the others' rounds are told as rivals'."""
-    runs = []
-    for n, x in enumerate(starts):
-        rows: list = []
-
-        def said(done: float, whole: float, text: str, n=n) -> None:
-            # A descent tells of 0.25 to 0.55 of an estimation, which all of them share.
-            say(0.25 + (0.3 * n + done - 0.25) / len(starts), whole, text if n == 0 else f"another valley, {text}")
-
-        try:
-            there, solution = descend(trial, x, ends, settings, rows, said)
-        except Breakdown:
-            # A rival that cannot be borne is none.
-            if n == 0:
-                raise
-            continue
-        runs.append((cost_of(solution.residual, solution.x, trial.wanted), rows, there, solution))
-    best = min(runs, key=lambda run: run[0])
-    for run in runs:
-        history += run[1] if run is best else [row | {"round": "rival"} for row in run[1]]
-    return best[2:]
 
 
 def _opened(

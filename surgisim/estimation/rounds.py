@@ -294,6 +294,35 @@ def descend(
     return trial, solution
 
 
+def lowest(
+    trial: Trial, starts: list[np.ndarray], ends: list[int], settings: Estimation, history: list, say: Say
+) -> tuple[Trial, Solution]:
+    """Of one descent from every start the one that ends lowest; the others' rounds are written down as rivals'.
+
+    Raises Breakdown where none of them can be borne.
+    """
+    runs, broken = [], None
+    for n, x in enumerate(starts):
+        rows: list = []
+
+        def said(done: float, whole: float, text: str, n=n) -> None:
+            # A descent tells of 0.25 to 0.55 of an estimation, which all of them share.
+            say(0.25 + (0.3 * n + done - 0.25) / len(starts), whole, text if n == 0 else f"another valley, {text}")
+
+        try:
+            there, solution = descend(trial, x, ends, settings, rows, said)
+        except Breakdown as breakdown:
+            broken = breakdown
+            continue
+        runs.append((cost_of(solution.residual, solution.x, trial.wanted), rows, there, solution))
+    if not runs:
+        raise broken
+    best = min(runs, key=lambda run: run[0])
+    for run in runs:
+        history += run[1] if run is best else [row | {"round": "rival"} for row in run[1]]
+    return best[2:]
+
+
 def windows(fitted: np.ndarray, phase: np.ndarray, share: float) -> list[int]:
     """Last frames of the rounds: each window twice the one before, and the first holds all of a pull and its release.
 

@@ -90,8 +90,8 @@ class Search:
             moved[k] += PACE[unit] * modulus + (damping if unit == "Pa s" else 0.0)
         return moved
 
-    def stiffer(self, x: np.ndarray, other: np.ndarray) -> float:
-        """Logarithm of how many times one point's tissue is stiffer than the other's, of all moduli the most."""
+    def log_modulus_ratio(self, x: np.ndarray, other: np.ndarray) -> float:
+        """The largest logarithm, either way, of the ratio of two points' moduli."""
         moduli = [k for k in np.flatnonzero(self.paces) if PACE[self.free[k][-1].unit] == 1]
         return float(np.abs(x - other)[moduli].max(initial=0.0))
 

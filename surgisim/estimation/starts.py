@@ -95,7 +95,7 @@ def _of_each_valley(points: list[np.ndarray], wanted: Search) -> tuple[list[np.n
     first: list[np.ndarray] = []
     others: list[np.ndarray] = []
     for x in points:
-        new = all(wanted.stiffer(x, one) > APART for one in first)
+        new = all(wanted.log_modulus_ratio(x, one) > APART for one in first)
         (first if new else others).append(x)
     return first, others
 
