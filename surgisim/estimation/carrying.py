@@ -35,8 +35,30 @@ OPENS = 0.2
 """Spread of the moment of release that no tracks narrow [frames]: jaws open over a while, a fit opens them at once, and
 its body springs back a little otherwise. On family 16180 four of thirteen moments were .3 to .5 frames off that tracks
 alone told to .05 to .45."""
+AROUND = 0.5
+"""Radii of a grip from which points tell how deep the surface is."""
+FAINT = 1e-9
+"""What a point far from a grip still weighs, so that where none is near the nearest ones tell."""
 MOST = 1 / 3
 """Share of the farthest way that a tracked point must go to say how a pull went in time."""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """The surface in frame 0 as tracked points of it tell."""
+
+    pixels: np.ndarray
+    """(K, 2)."""
+    depth: np.ndarray
+    """[m], (K,)."""
+
+    def at(self, pixel: np.ndarray, width: float) -> float:
+        """Depth at a pixel, (2,), of the plane through the points around it [m], each as heavy as a Gaussian of this
+        width [px] has it."""
+        apart = self.pixels - pixel
+        heavy = np.sqrt(np.exp(-0.5 * (apart**2).sum(1) / width**2) + FAINT)
+        plane = np.column_stack([np.ones(len(apart)), apart])
+        return float(np.linalg.lstsq(heavy[:, None] * plane, heavy * self.depth, rcond=None)[0][0])
 
 
 @dataclass(frozen=True)
@@ -47,6 +69,8 @@ class Carrying:
     camera: Camera
     share: np.ndarray
     """Share of its way that the pull has gone, (T,)."""
+    sheet: Sheet
+    """What a grip holds on to, wherever its middle is."""
     unknowns: tuple[Unknown, ...]
 
     def at(self, value: Mapping[str, float]) -> Motion:
@@ -59,12 +83,21 @@ class Carrying:
             start = self.camera.project(center)
             z = position[j, :, 2] + value.get(named(j, "toward"), 0.0) * center[2] * self._share(j)
             across = np.exp(value.get(named(j, "across"), 0.0))
-            beside = center[2] * np.array([value.get(named(j, "right"), 0.0), value.get(named(j, "down"), 0.0), 0.0])
-            position[j] = self.camera.lift(start + across * (pixels - start), z) + beside
-            middle[j] = center + beside
+            beside = np.array([value.get(named(j, "right"), 0.0), value.get(named(j, "down"), 0.0)])
+            middle[j] = self._beside(center, beside, float(found.radius[j]))
+            position[j] = self.camera.lift(start + across * (pixels - start), z) + middle[j] - center
             radius[j] *= np.exp(value.get(named(j, "radius"), 0.0))
             late[j] += value.get(named(j, "release"), 0.0)
         return replace(found, center_rest=middle, position=position, radius=radius, late=late)
+
+    def _beside(self, center: np.ndarray, beside: np.ndarray, radius: float) -> np.ndarray:
+        """Where a grip's middle [m], (3,), comes to along the surface, shares of its distance right and down, (2,)."""
+        if not beside.any():
+            return center
+        moved = center + center[2] * np.append(beside, 0.0)
+        width = AROUND * radius * self.camera.fx / center[2]
+        here, there = (self.sheet.at(self.camera.project(place[None])[0], width) for place in (center, moved))
+        return moved * there / here
 
     def _share(self, grip: int) -> np.ndarray:
         """The share while it holds: 0 before, and as it was when it let go after, (T,)."""
@@ -109,7 +142,9 @@ def carrying(motion: Motion, tracks: Tracks, camera: Camera, measured: bool) -> 
             unknowns.append(Unknown(named(j, "release"), RELEASE, RELEASE_SPREAD, *RELEASE_ENDS, "frames"))
     if not measured:
         motion = replace(motion, position=_level(motion, camera))
-    return Carrying(motion, camera, share, tuple(unknowns))
+    shown = tracks.visible[:, 0] & np.isfinite(tracks.xyz[:, 0]).all(1)
+    sheet = Sheet(tracks.xy[shown, 0].astype(float), tracks.xyz[shown, 0, 2].astype(float))
+    return Carrying(motion, camera, share, sheet, tuple(unknowns))
 
 
 def _nearer(motion: Motion, share: np.ndarray, grip: int) -> float:

@@ -12,6 +12,9 @@ RENEWED = 0.05
 """Share of the cost a step must win, or the derivative is taken anew."""
 SMALLER = (4.0, 16.0)
 """How many times smaller steps are where a body that hardly bears what pulls it breaks down beside where it is."""
+DAMPED = ((0.1, 1.0), (10.0, 100.0)), ((1e3, 1e4),)
+"""Times its damping with which a step is tried, two side by side; and where the derivative was just taken and none of
+them lowers the cost."""
 WIDTH = 2.0
 """Standard deviations beyond which a residual counts linearly: a lost track must not bend a modulus."""
 
@@ -53,9 +56,10 @@ def gauss_newton(
     several x at once, where that is quicker. jacobian: a derivative, (R, M), nearly right at x, to begin with.
     renewed: whether the derivative that is returned must have been taken at the end.
     Nocedal and Wright, Numerical optimization, 2nd ed. (2006), section 10.3; between derivatives by differences, which
-    cost a simulation a number, Broyden's update (ibid., section 11.1).
+    cost a simulation a number, Broyden's update (ibid., section 11.1). A number at a bound that the cost would drive
+    beyond it stays there, and the others step as if it were known (Bertsekas, Projected Newton methods, SIAM J. Control
+    Optim. 20, 1982): cut from a step of all, it leaves one that need not lead down.
     """
-    low, high = bounds
     damping = 1e-2
 
     def all_of(xs: list[np.ndarray]) -> list[np.ndarray | None]:
@@ -82,10 +86,8 @@ def gauss_newton(
             w = share / np.maximum(1.0, np.abs(r) / WIDTH)
             H = (J * w[:, None]).T @ J + np.diag(1 / spread**2)
             g = (J * w[:, None]).T @ r + (x - prior) / spread**2
-            for pair in ((0.1, 1.0), (10.0, 100.0)):
-                trials = [
-                    np.clip(x - np.linalg.solve(H + f * damping * np.diag(np.diag(H)), g), low, high) for f in pair
-                ]
+            for pair in (*DAMPED[0], *(DAMPED[1] if fresh else ())):
+                trials = [stepped(x, H, g, f * damping, bounds) for f in pair]
                 results = all_of(trials)
                 costs = [cost_of(q, t) for q, t in zip(results, trials, strict=True)]
                 k = int(np.argmin(costs))
@@ -111,6 +113,27 @@ def gauss_newton(
         if done:
             break
     return Solution(x, r, J if fresh or not renewed else jacobian_at(x, r))
+
+
+def stepped(
+    x: np.ndarray,
+    H: np.ndarray,
+    g: np.ndarray,
+    damping: float,
+    bounds: tuple[np.ndarray, np.ndarray],
+    free: np.ndarray | None = None,
+) -> np.ndarray:
+    """Where a damped step leads from x, (M,), within the bounds; free: numbers that may change, (M,) bool, all if None.
+
+    H, g: second derivative, (M, M), and first, (M,), of half of the cost.
+    """
+    low, high = bounds
+    moves = ~(((x <= low) & (g > 0)) | ((x >= high) & (g < 0)))
+    if free is not None:
+        moves &= free
+    step, mine = np.zeros_like(x), H[np.ix_(moves, moves)]
+    step[moves] = np.linalg.solve(mine + damping * np.diag(np.diag(mine)), g[moves])
+    return np.clip(x - step, low, high)
 
 
 def derivative(

@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from surgisim.artifacts.camera import Camera
-from surgisim.estimation.gauss_newton import WIDTH, Solution
+from surgisim.estimation.gauss_newton import WIDTH, Solution, stepped
 from surgisim.estimation.identify import overstated, spread_of
 from surgisim.estimation.rounds import INDEPENDENT, cost_of
 from surgisim.estimation.search import Search
@@ -288,9 +288,7 @@ def settled(
     one, must reach, or none is made.
     """
     trial, wanted, J = one.trial, one.trial.wanted, solution.jacobian
-    low, high = wanted.bounds
     x = solution.x if one.begin is None else one.begin
-    free = np.flatnonzero(np.ones(len(x), bool) if one.open is None else one.open)
     r = trial.residual(x, worker)
     if r is None:
         return Answer(one, x, r, np.inf, J)
@@ -299,10 +297,7 @@ def settled(
         w = _weights(r)
         hessian = (J * w[:, None]).T @ J + np.diag(1 / wanted.spread**2)
         g = J.T @ (w * r) + (x - wanted.start) / wanted.spread**2
-        step = np.zeros(len(x))
-        damped = hessian + damping * np.diag(np.diag(hessian))
-        step[free] = np.linalg.solve(damped[np.ix_(free, free)], g[free])
-        at = np.clip(x - step, low, high)
+        at = stepped(x, hessian, g, damping, wanted.bounds, one.open)
         there = trial.residual(at, worker)
         if there is None:
             damping *= 30

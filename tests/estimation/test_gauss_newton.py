@@ -36,3 +36,27 @@ def test_a_derivative_just_taken_is_followed_more_than_a_step(course):
     done = " ".join(course[0])
     assert done.count("derivative") > 1
     assert "derivative step derivative step" not in done
+
+
+def test_what_lies_beyond_a_bound_does_not_keep_the_others_from_their_best():
+    def sums(x: np.ndarray, worker: int = 0) -> np.ndarray:
+        return np.array([x[0] + x[1] - 4.0, 0.1 * (x[0] - x[1])])
+
+    found = gauss_newton(
+        sums, np.array([1.0, 0.0]), prior=np.zeros(2), spread=np.full(2, 1e4), differences=np.full(2, 1e-4),
+        bounds=(np.full(2, -9.0), np.array([1.0, 9.0])), share=1.0, iterations=20, workers=1,
+    )  # fmt: skip
+    # With x0 = 1, (x1 - 3)^2 + .01 (1 - x1)^2 is least at 3.01 / 1.01.
+    assert found.x == pytest.approx([1.0, 3.01 / 1.01], rel=1e-3)
+
+
+def test_where_every_long_step_fits_worse_a_short_one_is_found():
+    def bent(x: np.ndarray, worker: int = 0) -> np.ndarray:
+        """Straight only very near to where the search begins."""
+        return np.array([1.0 - x[0] + 40.0 * x[0] ** 2])
+
+    found = gauss_newton(
+        bent, np.zeros(1), prior=np.zeros(1), spread=np.full(1, 1e4), differences=np.full(1, 1e-6),
+        bounds=(np.full(1, -9.0), np.full(1, 9.0)), share=1.0, iterations=40, workers=1,
+    )  # fmt: skip
+    assert found.x[0] == pytest.approx(1 / 80, rel=0.1)
