@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
-from surgisim.estimation.observation import Observation
+from surgisim.estimation.observation import MEASURED, Observation
 
 BAND = 0.15
 """Points nearer to the picture's border than this share of its smaller side are at the edge."""
@@ -47,7 +47,8 @@ class Rim:
 
 
 def seen_rim(tracks: Tracks, motion: Motion, camera: Camera, spacing: float) -> Rim | None:
-    """Patches and how they go across the view, at their depth of frame 0; None where the edge is not seen well enough.
+    """Patches and how they go, along the view only where depth's change is measured; None where the edge is not seen
+    well enough.
 
     spacing: of the grid [m], which the smallest patch must fill.
     """
@@ -60,7 +61,10 @@ def seen_rim(tracks: Tracks, motion: Motion, camera: Camera, spacing: float) -> 
     if usable.sum() < FEWEST * PATCHES:
         return None
     rest, start = rest[usable], start[usable]
-    moved, seen = tracks.xy[usable] - start[:, None], tracks.visible[usable]
+    seen = tracks.visible[usable]
+    nearer = tracks.xyz[usable, :, 2] - rest[:, None, 2]
+    told = seen & (tracks.sigma_xyz[usable, :, 1] < MEASURED * rest[:, None, 2])
+    moved = np.concatenate([tracks.xy[usable] - start[:, None], np.where(told, nearer, 0.0)[..., None]], -1)
     middles, owner = kmeans2(start, PATCHES, minit="++", seed=0)
     apart = np.linalg.norm(middles[:, None] - middles, axis=-1) + np.diag(np.full(PATCHES, np.inf))
     position, radii = [], []
@@ -72,19 +76,19 @@ def seen_rim(tracks: Tracks, motion: Motion, camera: Camera, spacing: float) -> 
         way = _way(moved[mine], seen[mine])
         if way is None:
             continue
-        position.append(camera.lift(camera.project(place) + way, np.full(len(way), place[2])))
+        position.append(camera.lift(camera.project(place) + way[:, :2], place[2] + way[:, 2]))
         radii.append(max(spacing, LARGE * apart[e].min() * place[2] / camera.fx))
     return Rim(np.array(position), np.array(radii)) if position else None
 
 
 def _way(moved: np.ndarray, seen: np.ndarray) -> np.ndarray | None:
-    """Where points that moved so [px], (N, T, 2), went together, (T, 2), from frames in which enough are seen."""
+    """Where points that moved so, (N, T, C), went together, (T, C), from frames in which enough are seen."""
     enough = seen.sum(0) >= FEWEST
     enough[0] = True
     if enough.mean() < SEEN:
         return None
     frames = np.flatnonzero(enough)
     told = np.array([np.median(moved[seen[:, t], t], axis=0) for t in frames])
-    way = np.stack([np.interp(np.arange(len(enough)), frames, told[:, a]) for a in range(2)], 1)
+    way = np.stack([np.interp(np.arange(len(enough)), frames, told[:, a]) for a in range(told.shape[1])], 1)
     way = gaussian_filter1d(way, 0.7, axis=0, mode="nearest")
     return way - way[0]

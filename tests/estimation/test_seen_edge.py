@@ -51,6 +51,16 @@ def test_patches_follow_the_median_of_their_points_and_cross_gaps_evenly():
     assert (rim.position - rim.position[:, :1])[inner] == pytest.approx(wanted[inner], abs=3e-4)
 
 
+def test_patches_come_nearer_only_where_that_is_measured():
+    nearer = np.array([0.0, 0.0, -0.004])
+    tracks = tracks_of(np.linspace(0, 1, T)[None, :, None] * np.ones((1200, 1, 1)) * nearer, face())
+    rim = seen_rim(tracks, pulled(frames=T), CAMERA, 0.003)
+    assert (rim.position[:, -1] - rim.position[:, 0])[:, 2] == pytest.approx(-0.004, abs=3e-4)
+    guessed = replace(tracks, sigma_xyz=np.full_like(tracks.sigma_xyz, 0.006))
+    rim = seen_rim(guessed, pulled(frames=T), CAMERA, 0.003)
+    assert (rim.position[:, -1] - rim.position[:, 0])[:, 2] == pytest.approx(0.0, abs=1e-9)
+
+
 def test_an_edge_that_is_hardly_seen_says_nothing():
     tracks = tracks_of(np.zeros((1200, T, 3)), face())
     visible = np.arange(T) < 0.5 * T
