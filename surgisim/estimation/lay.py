@@ -56,16 +56,13 @@ class Columns:
     """Whether what holds it is flat, as deep below the surface's own plane, instead of following hills and hollows."""
 
     def laid(self, depth: float, *, rim: bool, base: bool = True) -> Body:
-        """The body whose tissue ends `depth` [m] below the surface, held there or not, and at its rim or not.
-
-        Nothing holds it where the camera looks past what would.
-        """
+        """The body whose tissue ends `depth` [m] below the surface, held there or not, and at its rim or not."""
         end = (self._plane if self.flat else self.above) + depth
         free = np.maximum(np.rint((end - self.begin) / self.layer), 0).astype(int)
         held = max(1, round(HELD * self.spacing / self.layer)) if base else 0
         kept = free > 0
         high = np.where(kept, (end - self.begin) / np.maximum(free, 1), self.layer)
-        count = np.where(kept, free + held * ~self._looked_past(end, depth), 0)
+        count = np.where(kept, free + held, 0)
         owner = np.repeat(np.arange(len(count)), count)
         level = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
         under = level >= free[owner]
@@ -83,15 +80,6 @@ class Columns:
             held=under | (rim & self.rim[owner]),
             spacing=self.spacing,
         )
-
-    def _looked_past(self, end: np.ndarray, depth: float) -> np.ndarray:
-        """Whether, no farther beside a column than its tissue is deep [m], a surface is seen that lies deeper than that
-        column's end [m], (N,): what is in front of it hangs free there. A slope below 45 degrees does not show it.
-        """
-        deepest = cKDTree(self.xy[self.seen])
-        near = deepest.query_ball_point(self.xy, depth)
-        above = self.above[self.seen]
-        return np.array([bool(n) and above[n].max() > e for n, e in zip(near, end, strict=True)])
 
     @property
     def pitch(self) -> np.ndarray:

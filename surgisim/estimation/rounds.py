@@ -150,18 +150,15 @@ def ask_rim(
     carried = replace(alone, motion=rim.carries(alone.motion))
     hung = replace(carried, laying=replace(carried.laying, base=False, kept={}))
     # What goes along may bear a firmer grip than what is held.
-    grips = sorted({1.0, trial.grip})
-    tried = [replace(one, grip=grip) for one in (carried, hung) for grip in grips]
+    tried = [replace(one, grip=grip) for one in (carried, hung) for grip in sorted({1.0, trial.grip})]
     without, *along = at_once(partial(_cost, last=last), [(one, x) for one in (alone, *tried)])
     for one, c in zip(tried, along, strict=True):
         told = {"patches": len(rim.radius), "base": one.laying.base, "grip": one.grip}
         history.append({"round": "edge"} | told | {"without": number(without), "cost": number(c)})
     if min(along) >= without:
         return trial, x
-    # Tissue that only its edge holds lies otherwise before its shape is fitted: which of the two is right shows after.
-    pairs, bodies = list(zip(along, tried, strict=True)), (slice(len(grips)), slice(len(grips), None))
-    each = [min(pairs[mine], key=lambda one: one[0]) for mine in bodies]
-    best, there = settle_pull([one for c, one in each if np.isfinite(c)], x, phase, history, say)
+    best = tried[int(np.argmin(along))]
+    best, there = settle_pull([best], x, phase, history, say)
     cost = _cost((best, there), last=last)
     history.append({"round": "edge", "patches": len(rim.radius), "without": number(without), "cost": number(cost)})
     return (best, there) if cost < MOVED * without else (trial, x)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import sparse
-from scipy.spatial import cKDTree
 from slab import slab
 from slab_clip import CAMERA
 
@@ -57,35 +56,6 @@ def test_a_body_is_laid_to_its_depth_whatever_the_layers():
         free = ~laid.held
         assert laid.volume[free].sum() == pytest.approx(0.048 * 0.036 * depth, rel=1e-5)
         assert laid.rest[laid.held, 2].min() > 0.06 + depth > laid.rest[free, 2].max()
-
-
-def stepped(far: float):
-    """Columns of a slab whose right half lies so much deeper [m]."""
-    body = slab()
-    rest = body.rest.copy()
-    rest[:, 2] += far * (rest[:, 0] > 0)
-    return upright(replace(body, rest=rest), CAMERA)
-
-
-def test_nothing_holds_tissue_where_the_camera_looks_past_what_would():
-    depth = 0.010
-    columns = stepped(0.015)
-    laid = columns.laid(depth, rim=False)
-    held = cKDTree(laid.rest[laid.held, :2]).query(columns.xy)[0] < 1e-6
-    near = (columns.xy[:, 0] < 0) & (columns.xy[:, 0] > -depth + 0.0035)
-    far = (columns.xy[:, 0] > 0) | (columns.xy[:, 0] < -depth - 0.0035)
-    assert near.any()
-    assert not held[near].any()
-    assert held[far].all()
-
-
-def test_a_step_lower_than_the_tissue_is_deep_and_a_gentle_slope_show_no_way_past():
-    assert not stepped(0.009)._looked_past(stepped(0.009).above + 0.010, 0.010).any()
-    body = slab()
-    tilted = body.rest.copy()
-    tilted[:, 2] += 0.9 * tilted[:, 0]
-    columns = upright(replace(body, rest=tilted), CAMERA)
-    assert not columns._looked_past(columns.above + 0.010, 0.010).any()
 
 
 def test_tissue_beyond_the_picture_lies_on_the_plane_of_its_edge():
