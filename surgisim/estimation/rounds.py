@@ -148,19 +148,29 @@ def ask_rim(
         size = np.where(observation.weight > 0, trial.error.size, 0.0)
         alone = replace(alone, error=replace(trial.error, size=size, kept={}))
     carried = replace(alone, motion=rim.carries(alone.motion))
-    hung = replace(carried, laying=replace(carried.laying, base=False, kept={}))
+    # What only its edge carries ends there: beyond it nothing would.
+    hung = replace(carried, laying=replace(carried.laying.ending(0.0, False), base=False))
     # What goes along may bear a firmer grip than what is held.
-    tried = [replace(one, grip=grip) for one in (carried, hung) for grip in sorted({1.0, trial.grip})]
-    without, *along = at_once(partial(_cost, last=last), [(one, x) for one in (alone, *tried)])
-    for one, c in zip(tried, along, strict=True):
+    grips = sorted({1.0, trial.grip})
+    kinds = [[replace(one, grip=grip) for grip in grips] for one in (carried, hung)]
+    without, *along = at_once(partial(_cost, last=last), [(one, x) for one in (alone, *kinds[0], *kinds[1])])
+    costs = np.array(along).reshape(len(kinds), len(grips))
+    for one, c in zip(itertools.chain(*kinds), along, strict=True):
         told = {"patches": len(rim.radius), "base": one.laying.base, "grip": one.grip}
         history.append({"round": "edge"} | told | {"without": number(without), "cost": number(c)})
-    if min(along) >= without:
+    if costs.min() >= without:
         return trial, x
-    best = tried[int(np.argmin(along))]
-    best, there = settle_pull([best], x, phase, history, say)
-    cost = _cost((best, there), last=last)
-    history.append({"round": "edge", "patches": len(rim.radius), "without": number(without), "cost": number(cost)})
+    # The shape was fitted to a body that is held: one that hangs has to be fitted before they can be compared.
+    fits = []
+    for kind, c in zip(kinds, costs, strict=True):
+        if not np.isfinite(c).any():
+            continue
+        best, there = settle_pull([kind[int(np.argmin(c))]], x, phase, history, say)
+        cost = _cost((best, there), last=last)
+        told = {"patches": len(rim.radius), "base": best.laying.base}
+        history.append({"round": "edge"} | told | {"without": number(without), "cost": number(cost)})
+        fits.append((cost, best, there))
+    cost, best, there = min(fits, key=lambda fit: fit[0])
     return (best, there) if cost < MOVED * without else (trial, x)
 
 
