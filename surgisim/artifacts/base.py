@@ -49,7 +49,7 @@ class Artifact:
                     )
                 header = json.loads(str(archive[HEADER]))
                 _check_kind(cls, header, path)
-                names = [f.name for f in dataclasses.fields(cls)]
+                names = [f.name for f in dataclasses.fields(cls) if f.name in archive or _needed(f)]
                 missing = [n for n in names if n not in archive]
                 if missing:
                     raise Problem(f"{path}: lacks {missing} of a {cls.__name__}. Run the stage that makes it again.")
@@ -83,8 +83,7 @@ class JsonArtifact(Artifact):
             raise Problem(f"{path}: has no header, but a {cls.__name__} written by this project is wanted here.")
         _check_kind(cls, header, path)
         names = {f.name for f in dataclasses.fields(cls)}
-        missing = dataclasses.MISSING
-        needed = {f.name for f in dataclasses.fields(cls) if f.default is missing and f.default_factory is missing}
+        needed = {f.name for f in dataclasses.fields(cls) if _needed(f)}
         if not needed <= set(body) <= names:
             wrong = sorted((needed - set(body)) | (set(body) - names))
             raise Problem(f"{path}: a {cls.__name__} has exactly {sorted(names)}; {wrong} do not match.")
@@ -151,6 +150,11 @@ def _check_kind(kind: type, header: Mapping[str, Any], path: Path) -> None:
             f"{path}: holds a {header.get('kind')}, but a {kind.__name__} is wanted here. "
             "Check which stage's output is passed."
         )
+
+
+def _needed(field: dataclasses.Field) -> bool:
+    """Whether a kind is nothing without it."""
+    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
 def _plain(array: np.ndarray) -> Any:

@@ -35,6 +35,9 @@ class Estimation(Settings):
     """Whether to choose how deep and where the body is held by what fits the pull best [-]."""
     seen_rim: bool = True
     """Whether the edge of the picture may be carried as it is seen to go, where that fits far better elsewhere [-]."""
+    pieces: bool = True
+    """Whether tissue that goes along with a grip may be held by nothing below it, nor by what it is seen to slide past,
+    where that fits far better [-]."""
     carrying: bool = True
     """Whether what is open of the grips (how far they come nearer, size, release) is fitted with the laws [-]."""
     brightness: bool = True

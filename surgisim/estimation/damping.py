@@ -19,7 +19,7 @@ def numerical_damping(body, density: float, values: Values, held: np.ndarray, st
     laws = {n: t for n, t in choose(values).items() if t.energy is not None and not t.memory}
     made = prepare(body, tuple(laws), density=density, device=device)
     simulator = made.simulator
-    nodes = simulator.grid.positions()[simulator.place]
+    nodes = simulator.grid.positions()[simulator.place % simulator.grid.count]
     base = body.rest[held].astype(float) if held.any() else body.rest.astype(float).mean(0, keepdims=True)
     height = np.linalg.norm(nodes - base.mean(0), axis=1)
     reach = float(np.ptp(body.rest.astype(float), axis=0).max())

@@ -43,11 +43,12 @@ from surgisim.estimation.otherwise import (
     shares,
 )
 from surgisim.estimation.picture import picture_loss
+from surgisim.estimation.pieces import seen_piece
 from surgisim.estimation.refine import Refined, refine
 from surgisim.estimation.rim import seen_rim
 from surgisim.estimation.rounds import (
     INDEPENDENT,
-    ask_rim,
+    ask_hold,
     at_ease,
     choose_support,
     descend,
@@ -164,10 +165,11 @@ def estimate(
         trial = edges[0]
     searched = settings.enabled and bool(wanted.free)
     if searched:
-        trial, x = settle_pull(edges, x, phase, history, progress)
+        begun = x
+        trial, x = settle_pull(edges, begun, phase, history, progress)
         rim = seen_rim(tracks, motion, camera, body.spacing) if settings.seen_rim and trial.laying else None
-        if rim:
-            trial, x = ask_rim(trial, x, rim, phase, history, progress)
+        piece = seen_piece(trial.laying.columns, tracks, motion) if settings.pieces and trial.laying else None
+        trial, x = ask_hold(trial, x, begun, rim, piece, phase, history, progress)
         default = replace(default, weight=np.where(trial.observation.weight > 0, default.weight, 0.0))
     before = {name: default.error(run.u, at) for name, at in parts.items()}
     before_each = default.each(run.u, held_out)
@@ -192,6 +194,9 @@ def estimate(
         wide, wide_x = trial, x
         unsure = none(tracks)
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
+    loose = (
+        float(np.mean(trial.laying.columns.loose)) if trial.laying and trial.laying.columns.loose is not None else 0.0
+    )
     depth = trial.depth(x)
 
     def alone(trial: Trial) -> Trial:
@@ -212,8 +217,8 @@ def estimate(
         field, refined = _refined(coarse, uniform, wide.eased or 0.0, scene, frames, masks, camera, settings, progress)
         theta = _brought(field, coarse, uniform, trial, values)
     trial, run = handed_on(trial, values, theta, history)
-    support = Support(depth, *edge, len(trial.motion.rim))
     prepared, laid = trial.bodies[0], trial.bodies[0].body
+    support = Support(depth, *edge, len(trial.motion.rim), loose, bool(len(laid.torn)))
     path = trial.drive(values, stiffest=prepared.stiffest(theta))
     after = {name: trial.observation.error(run.u, at) for name, at in parts.items()}
     after_each = trial.observation.each(run.u, held_out)

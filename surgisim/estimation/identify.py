@@ -176,6 +176,9 @@ def in_words(
         parts.append(
             f"At {support.patches} places along the edge of the picture it is carried as it is seen to go there."
         )
+    if support.loose:
+        past = ", and it slides past what lies beside it" if support.torn else ""
+        parts.append(f"{support.loose:.0%} of what is seen goes along with the grip: nothing below holds that{past}.")
     if grip < 1:
         parts.append(
             f"Held firmly, the tissue would turn inside out under the grip's path; it is held with {grip:g} of the "

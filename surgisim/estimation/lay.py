@@ -54,12 +54,20 @@ class Columns:
     """How much tissue was laid below the surface, at the median column [m]."""
     flat: bool = False
     """Whether what holds it is flat, as deep below the surface's own plane, instead of following hills and hollows."""
+    loose: np.ndarray | None = None
+    """Which columns nothing holds, neither from below nor at the rim, (N,) bool; None where that is none."""
+    torn: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    """Walls through which it does not hang together, as `Body.torn`, (K, 2, 2) [m]."""
 
     def laid(self, depth: float, *, rim: bool, base: bool = True) -> Body:
         """The body whose tissue ends `depth` [m] below the surface, held there or not, and at its rim or not."""
         end = (self._plane if self.flat else self.above) + depth
+        held = np.full(len(end), max(1, round(HELD * self.spacing / self.layer)) if base else 0)
+        around = self.rim & rim
+        if self.loose is not None:
+            end = np.where(self.loose, self._bridged(end), end)
+            held[self.loose], around = 0, around & ~self.loose
         free = np.maximum(np.rint((end - self.begin) / self.layer), 0).astype(int)
-        held = max(1, round(HELD * self.spacing / self.layer)) if base else 0
         kept = free > 0
         high = np.where(kept, (end - self.begin) / np.maximum(free, 1), self.layer)
         count = np.where(kept, free + held, 0)
@@ -77,9 +85,22 @@ class Columns:
             volume=volume.astype(np.float32),
             color=self.color[owner].astype(np.float32),
             surface=(level == 0) & self.seen[owner],
-            held=under | (rim & self.rim[owner]),
+            held=under | around[owner],
             spacing=self.spacing,
+            torn=self.torn,
         )
+
+    def _bridged(self, end: np.ndarray) -> np.ndarray:
+        """Where columns end, (N,), with those of a loose piece that end before one beside them begins brought down to
+        it: what moves as one hangs together, however steep its surface is in between."""
+        who = np.flatnonzero(self.loose)
+        pairs = cKDTree(self.xy[who]).query_pairs(self.spacing, output_type="ndarray")
+        down = end.copy()
+        for a, b in (who[pairs].T, who[pairs[:, ::-1]].T):
+            np.maximum.at(
+                down, a, np.where(self.above[b] > end[a] - self.spacing, self.above[b] + self.spacing, end[a])
+            )
+        return down
 
     @property
     def pitch(self) -> np.ndarray:
@@ -125,6 +146,7 @@ def beyond(columns: Columns, margin: float, held: float = 0.0) -> Columns:
         color=np.concatenate([columns.color, columns.color[near[:, 0]]]),
         seen=np.concatenate([columns.seen, np.zeros(count, bool)]),
         rim=np.concatenate([np.zeros(len(columns.rim), bool), away > margin + slack]),
+        loose=None if columns.loose is None else np.concatenate([columns.loose, columns.loose[near[:, 0]]]),
     )
 
 
@@ -152,6 +174,7 @@ def finer(columns: Columns, times: float) -> Columns:
         color=columns.color[owner],
         seen=columns.seen[owner],
         rim=columns.rim[owner],
+        loose=None if columns.loose is None else columns.loose[owner],
         spacing=columns.spacing / times,
         layer=columns.layer / times,
     )
@@ -177,6 +200,10 @@ class Laying:
     def ending(self, margin: float, rim: bool) -> Self:
         """The same with another edge."""
         return replace(self, margin=margin, rim=rim, kept={})
+
+    def parted(self, loose: np.ndarray, walls: np.ndarray) -> Self:
+        """The same in which nothing holds the `loose` columns from below, (N,) bool, nor anything across `walls`."""
+        return replace(self, columns=replace(self.columns, loose=loose, torn=walls), kept={})
 
     def finer(self, times: float) -> Self:
         """The same on a grid that many times as fine."""

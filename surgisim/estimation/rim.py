@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.cluster.vq import kmeans2
 from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import cKDTree
 
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
@@ -39,6 +40,11 @@ class Rim:
     def carries(self, motion: Motion) -> Motion:
         """The motion with what the edge does."""
         return replace(motion, rim=self.position, rim_radius=self.radius)
+
+    def beside(self, places: np.ndarray) -> "Rim":
+        """Those patches that hold none of these places, camera frame x and y [m], (N, 2)."""
+        away = cKDTree(places).query(self.position[:, 0, :2])[0]
+        return Rim(self.position[away > self.radius], self.radius[away > self.radius])
 
     def leaves(self, observation: Observation, motion: Motion) -> Observation:
         """What is observed without the points that say where patches go; motion: what carries the tissue."""

@@ -17,6 +17,7 @@ from surgisim.config.estimation import Estimation
 from surgisim.estimation.bearing import borne, softer
 from surgisim.estimation.gauss_newton import Solution, gauss_newton, misfit
 from surgisim.estimation.observation import PHASES
+from surgisim.estimation.pieces import Piece
 from surgisim.estimation.rim import Rim
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import MIDDLE, SHARES, edges_of
@@ -37,6 +38,8 @@ INERTIA = 0.005
 a slab held 15 mm deep is found held 13.3 mm deep, at .005 14.5 mm, at the pace of its own modulus 14.7 mm."""
 MOVED = 0.9
 """Share of the misfit elsewhere below which a body is taken to be moved by what its edge is seen to do."""
+ONE_PIECE, IN_PIECES = ("carried edge", "hung"), ("loose piece", "parted piece")
+"""Other ways in which a body may be held, the plainer first."""
 HEATS, FINALISTS = (2, 4), 2
 """Most iterations on the shape of a pull before its release is looked at: first with every edge, then with the best."""
 FAR, LAGS = 0.95, 3
@@ -129,49 +132,78 @@ def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> 
     return [replace(trial, laying=trial.laying.ending(*end)) for end in found], x
 
 
-def ask_rim(
-    trial: Trial, x: np.ndarray, rim: Rim, phase: np.ndarray, history: list, say: Say
-) -> tuple[Trial, np.ndarray]:
-    """The trial with its edge carried as it is seen to go, and x with a pull's shape fitted so, where that fits what is
-    not seen at the edge far better; else both as they are.
+def ask_hold(
+    trial: Trial, x: np.ndarray, begun: np.ndarray, rim: Rim | None, piece: Piece | None, phase: np.ndarray,
+    history: list, say: Say,
+) -> tuple[Trial, np.ndarray]:  # fmt: skip
+    """The trial held as what is seen of its edge and of what goes along with the grip says, and x with a pull's shape
+    fitted so, where that fits what is not seen at the edge far better; else both as they are.
 
-    It is asked once the shape has been fitted without: what else is wrong of a body is seen at its edge as well.
+    It is asked once the shape has been fitted without: what else is wrong of a body is seen at its edge as well. begun:
+    where that fit began, for what cannot be simulated where it ended.
     """
     last = _driven(trial, phase)
-    if not last:
+    if not last or not (rim or piece):
         return trial, x
-    # What says where patches go is no evidence that they do.
-    observation = rim.leaves(trial.observation, trial.motion)
-    alone = replace(trial, observation=observation, laying=replace(trial.laying, observation=observation, kept={}))
-    if trial.error:
-        # A point that is left out says nothing of the simulation's own error either.
-        size = np.where(observation.weight > 0, trial.error.size, 0.0)
-        alone = replace(alone, error=replace(trial.error, size=size, kept={}))
-    carried = replace(alone, motion=rim.carries(alone.motion))
-    # What only its edge carries ends there: beyond it nothing would.
-    hung = replace(carried, laying=replace(carried.laying.ending(0.0, False), base=False))
+    alone = _without(trial, rim) if rim else trial
+    kinds = _kinds(alone, rim, piece)
     # What goes along may bear a firmer grip than what is held.
     grips = sorted({1.0, trial.grip})
-    kinds = [[replace(one, grip=grip) for grip in grips] for one in (carried, hung)]
-    without, *along = at_once(partial(_cost, last=last), [(one, x) for one in (alone, *kinds[0], *kinds[1])])
-    costs = np.array(along).reshape(len(kinds), len(grips))
-    for one, c in zip(itertools.chain(*kinds), along, strict=True):
-        told = {"patches": len(rim.radius), "base": one.laying.base, "grip": one.grip}
-        history.append({"round": "edge"} | told | {"without": number(without), "cost": number(c)})
-    if costs.min() >= without:
+    ways = {(name, grip): replace(one, grip=grip) for name, one in kinds.items() for grip in grips}
+    without, *along = at_once(partial(_cost, last=last), [(one, x) for one in (alone, *ways.values())])
+    begins = {way: (c, x) for way, c in zip(ways, along, strict=True)}
+    broken = [way for way, c in zip(ways, along, strict=True) if not np.isfinite(c)]
+    again = at_once(partial(_cost, last=last), [(ways[way], begun) for way in broken])
+    begins |= {way: (c, begun) for way, c in zip(broken, again, strict=True)}
+    for (name, grip), (c, _) in begins.items():
+        history.append({"round": "hold", "as": name, "grip": grip, "without": number(without), "cost": number(c)})
+    if min(c for c, _ in begins.values()) >= without:
         return trial, x
-    # The shape was fitted to a body that is held: one that hangs has to be fitted before they can be compared.
-    fits = []
-    for kind, c in zip(kinds, costs, strict=True):
-        if not np.isfinite(c).any():
+    # The shape was fitted to a body that is held: another has to be fitted before they can be compared.
+    fits = {}
+    for name in kinds:
+        grip = min(grips, key=lambda grip, name=name: begins[name, grip][0])
+        c, begin = begins[name, grip]
+        if not np.isfinite(c):
             continue
-        best, there = settle_pull([kind[int(np.argmin(c))]], x, phase, history, say)
+        best, there = settle_pull([ways[name, grip]], begin, phase, history, say)
         cost = _cost((best, there), last=last)
-        told = {"patches": len(rim.radius), "base": best.laying.base}
-        history.append({"round": "edge"} | told | {"without": number(without), "cost": number(cost)})
-        fits.append((cost, best, there))
-    cost, best, there = min(fits, key=lambda fit: fit[0])
-    return (best, there) if cost < MOVED * without else (trial, x)
+        history.append({"round": "hold", "as": name, "without": number(without), "cost": number(cost)})
+        fits[name] = cost, best, there
+    chosen, least = (trial, x), without
+    # A body in pieces has to be as much better again than one in a single piece.
+    for names in (ONE_PIECE, IN_PIECES):
+        cost, *found = min((fits[n] for n in names if n in fits), key=lambda fit: fit[0], default=(np.inf,))
+        if cost < MOVED * least:
+            chosen, least = tuple(found), cost
+    return chosen
+
+
+def _without(trial: Trial, rim: Rim) -> Trial:
+    """The trial without the points that say where the edge goes: they are no evidence that it does."""
+    observation = rim.leaves(trial.observation, trial.motion)
+    alone = replace(trial, observation=observation, laying=replace(trial.laying, observation=observation, kept={}))
+    if not trial.error:
+        return alone
+    # A point that is left out says nothing of the simulation's own error either.
+    size = np.where(observation.weight > 0, trial.error.size, 0.0)
+    return replace(alone, error=replace(trial.error, size=size, kept={}))
+
+
+def _kinds(alone: Trial, rim: Rim | None, piece: Piece | None) -> dict[str, Trial]:
+    """Other ways in which a body may be held, by name."""
+    kinds: dict[str, Trial] = {}
+    if rim:
+        kinds[ONE_PIECE[0]] = carried = replace(alone, motion=rim.carries(alone.motion))
+        # What only its edge carries ends there: beyond it nothing would.
+        kinds[ONE_PIECE[1]] = replace(carried, laying=replace(carried.laying.ending(0.0, False), base=False))
+    if piece:
+        # What goes along with a grip is carried by that alone.
+        beside = replace(alone, motion=rim.beside(piece.middles).carries(alone.motion)) if rim else alone
+        kinds[IN_PIECES[0]] = replace(beside, laying=beside.laying.parted(piece.loose, piece.walls[:0]))
+        if len(piece.walls):
+            kinds[IN_PIECES[1]] = replace(beside, laying=beside.laying.parted(piece.loose, piece.walls))
+    return kinds
 
 
 def _driven(trial: Trial, phase: np.ndarray) -> int:

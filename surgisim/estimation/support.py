@@ -59,6 +59,10 @@ class Support:
     """Whether it is held where it ends there."""
     patches: int = 0
     """Of the edge of what is seen that go as they are seen to."""
+    loose: float = 0.0
+    """Share of what is seen that only the grip and what it hangs on hold."""
+    torn: bool = False
+    """Whether that is parted from what it is seen to slide past."""
 
 
 def open_depth(columns: Columns) -> Unknown:

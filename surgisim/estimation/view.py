@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
@@ -82,10 +83,14 @@ class View:
         """The body in this view, as thick as it was."""
         top = np.concatenate([laid.xy, laid.above[:, None]], 1)
         factor = self.factor(top)
+        ends = laid.torn.reshape(-1, 2)
+        near = cKDTree(laid.xy).query(ends)[1]
+        torn = (ends * factor[near, :2]).reshape(laid.torn.shape)
         return replace(
             laid,
             xy=laid.xy * factor[:, :2],
             begin=laid.begin + laid.above * (factor[:, 2] - 1),
             above=laid.above * factor[:, 2],
             area=laid.area * factor[:, 0] * factor[:, 1],
+            torn=torn,
         )

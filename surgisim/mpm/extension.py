@@ -15,8 +15,8 @@ import numpy as np
 from scipy import sparse
 from scipy.ndimage import binary_dilation
 
-from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
+from surgisim.mpm.tear import Severing
 
 SOLID = 0.02
 """Share of the largest nodal mass above which a node moves by itself."""
@@ -26,7 +26,7 @@ PASSES = 4
 """Rings of nodes around the body that are carried along."""
 
 
-def extension(grid: Grid, mass: np.ndarray, cut: Cut | None) -> tuple[np.ndarray, sparse.csr_matrix]:
+def extension(grid: Grid, mass: np.ndarray, cut: Severing | None) -> tuple[np.ndarray, sparse.csr_matrix]:
     """Solid nodes (A,), and the rule for every node from them, (N or 2 N, A); rows of unreached nodes are zero.
 
     mass [kg], (N,), or (2 N,) once cut: the second half are the copies seen from across the cut.
@@ -40,7 +40,7 @@ def extension(grid: Grid, mass: np.ndarray, cut: Cut | None) -> tuple[np.ndarray
         solid[place[light]] = False
 
 
-def _followed(grid: Grid, solid: np.ndarray, cut: Cut | None) -> tuple[np.ndarray, sparse.csr_matrix]:
+def _followed(grid: Grid, solid: np.ndarray, cut: Severing | None) -> tuple[np.ndarray, sparse.csr_matrix]:
     place = np.flatnonzero(solid)
     size = len(solid)
     rule = sparse.csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), (size, len(place)))
@@ -73,7 +73,7 @@ def _followed(grid: Grid, solid: np.ndarray, cut: Cut | None) -> tuple[np.ndarra
     return place, rule.tocsr()
 
 
-def _neighbours(grid: Grid, size: int, axis: int, sign: int, cut: Cut | None) -> np.ndarray:
+def _neighbours(grid: Grid, size: int, axis: int, sign: int, cut: Severing | None) -> np.ndarray:
     """Next node along an axis, -1 where there is none or the cut lies between, (size,)."""
     n = grid.count
     index = np.stack(np.unravel_index(np.arange(n), grid.shape), -1)

@@ -3,10 +3,10 @@
 import numpy as np
 from scipy import sparse
 
-from surgisim.mpm.cut import Cut
 from surgisim.mpm.extension import extension
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.kink import Ball, Kinks
+from surgisim.mpm.tear import Severing
 
 
 class Nodes:
@@ -16,7 +16,7 @@ class Nodes:
     """
 
     def __init__(
-        self, grid: Grid, rest: np.ndarray, volume: np.ndarray, cut: Cut | None, balls: tuple[Ball, ...] = ()
+        self, grid: Grid, rest: np.ndarray, volume: np.ndarray, cut: Severing | None, balls: tuple[Ball, ...] = ()
     ) -> None:
         """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,)."""
         self.grid, self.cut = grid, cut

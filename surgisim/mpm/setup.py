@@ -13,12 +13,12 @@ from surgisim.artifacts.body import Body
 from surgisim.artifacts.material import Material
 from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.physics import Physics
-from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import ANCHOR, BASE, SHARP_ANCHOR, Drive, drive
 from surgisim.mpm.kink import Ball
 from surgisim.mpm.simulator import Simulator
 from surgisim.mpm.stable import check_speed, check_step, largest_step, shear_speed, wave_speed
+from surgisim.mpm.tear import Severing, Tear, severed
 from surgisim.mpm.updated import Updated
 from surgisim.physics.catalogue import Numbers, Term, choose, columns, defaults
 from surgisim.physics.place import Place, rows
@@ -161,7 +161,7 @@ def prepare(
     density: float,
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     carried: np.ndarray | None = None,
-    cut: Cut | None = None,
+    cut: Severing | None = None,
     places: Mapping[str, Place] | None = None,
     device: str = "cpu",
     precision: str = "single",
@@ -179,7 +179,8 @@ def prepare(
     given = {
         "rest": body.rest, "volume": body.volume, "density": density,
         "grid": Grid.around(body.rest, body.spacing, carried),
-        "terms": terms, "gravity": gravity, "cut": cut, "device": device,
+        "terms": terms, "gravity": gravity, "cut": severed(Tear(body.torn) if len(body.torn) else None, cut),
+        "device": device,
     }  # fmt: skip
     if form == "updated":
         return Prepared(Updated(**given), tuple(terms), density, body, places or {})

@@ -15,7 +15,6 @@ import warp as wp
 from surgisim.mpm.by_cell import ByCell
 from surgisim.mpm.by_particle import ByParticle
 from surgisim.mpm.culprit import culprit
-from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.kernels import node_kernels, shapes, tick
@@ -23,6 +22,7 @@ from surgisim.mpm.kink import Ball
 from surgisim.mpm.march import March, Phases
 from surgisim.mpm.nodes import Nodes
 from surgisim.mpm.stream import Stream
+from surgisim.mpm.tear import Severing
 from surgisim.physics.catalogue import choose, columns
 from surgisim.problem import Problem
 
@@ -97,7 +97,7 @@ class Simulator(Nodes):
         grid: Grid,
         terms: tuple[str, ...],
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        cut: Cut | None = None,
+        cut: Severing | None = None,
         device: str = "cpu",
         precision: str = "single",
         threads: int = 1,

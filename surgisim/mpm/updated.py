@@ -19,13 +19,13 @@ import warp as wp
 from scipy import sparse
 from scipy.sparse.linalg import factorized
 
-from surgisim.mpm.cut import Cut
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.kernels import shapes, tick
 from surgisim.mpm.march import March
 from surgisim.mpm.nodes import Nodes
 from surgisim.mpm.simulator import NEVER, Breakdown, Run
+from surgisim.mpm.tear import Severing
 from surgisim.physics.fold import folded
 from surgisim.problem import Problem
 
@@ -45,7 +45,7 @@ class Updated(Nodes):
         grid: Grid,
         terms: tuple[str, ...],
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        cut: Cut | None = None,
+        cut: Severing | None = None,
         device: str = "cpu",
     ) -> None:
         """Particles `rest` [m], (P, 3), of `volume` [m^3], (P,). Raises Problem where a cut is asked for."""

@@ -1,7 +1,9 @@
 """Where held tissue is carried, in space."""
 
+from dataclasses import replace
+
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, median_filter
 
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.depth import Depth
@@ -17,6 +19,10 @@ ASTRAY, SLACK = 0.35, 0.015
 AROUND, OFTEN, LEAST = 4.0, 0.8, 10
 """Radii of a grip within which tissue tells the course of its way in time; share of the frames in which such a point is
 seen; points at least."""
+EDGE, ALIKE, DISC = 0.1, 0.03, 0.6
+"""Where depth's change is measured: how much nearer or farther than the jaws as they close the depth at a grip's place
+is, as a share, if that lies beside an edge of depth; how near to theirs the depth of what they hold is, as a share; and
+radii of a grip within which depth is theirs."""
 COURSES, ELSE = 2, 0.2
 """Courses in time of which all tissue around a pull has its share: with two, a way's course is .3 % off (root mean
 square, as a share of its length; 38 and 40 clips of families 27182 and 16180) where the ring alone has it 1.0 and .7 %
@@ -36,10 +42,13 @@ def carry(
     z = _depth_at(depth, paths.xy)
     center, radius, position, active = [], [], [], []
     for grip, step in zip(grips, jaws, strict=True):
-        rest_z = float(sample(depth.z[0].astype(np.float32), grip.center[None, None].astype(np.float32))[0, 0])
+        middle, rest_z, theirs = _rest(grip, paths, depth)
+        grip = replace(grip, center=middle)
         held = np.linalg.norm(paths.xy[:, 0] - grip.center, axis=-1)
         ring = held <= max(grip.radius, np.sort(held)[min(8, len(held) - 1)])
         place, deep = _course(paths, z, ring, step, grip, max(camera.width, camera.height))
+        if theirs is not None:
+            deep = _at_jaws(depth, grip.center + place, grip, theirs)
         way = camera.lift(grip.center + place, rest_z + deep)
         rest = camera.lift(grip.center, np.array(rest_z))
         way[: grip.begin + 1] = rest
@@ -57,6 +66,53 @@ def carry(
         confidence=np.array([g.confidence for g in grips]).reshape(count),
         source=source if count else "none",
     )
+
+
+def _rest(grip: Grip, paths: Paths, depth: Depth) -> tuple[np.ndarray, float, float | None]:
+    """Where in frame 0 the held tissue lies [px], (2,), how deep [m], and beside an edge of depth how deep the jaws are
+    as they close [m].
+
+    Beside one, a place a few pixels off is on other tissue: what jaws hold is as deep as they are when they close.
+    """
+    z = depth.z[0].astype(np.float32)
+    here = float(sample(z, grip.center[None, None].astype(np.float32))[0, 0])
+    if not depth.follows:
+        return grip.center, here, None
+    near = np.argsort(np.linalg.norm(paths.xy[:, 0] - grip.center, axis=-1))[:9]
+    closing = range(grip.begin, min(grip.begin + SHOWN, grip.end) + 1)
+    moved = [np.median(paths.xy[near, t] - paths.xy[near, 0], axis=0) for t in closing]
+    theirs = float(np.median([_disc(depth.z[t], grip.center + m, grip) for t, m in zip(closing, moved, strict=True)]))
+    if abs(here - theirs) <= EDGE * theirs:
+        return grip.center, here, None
+    y, x = np.mgrid[: z.shape[0], : z.shape[1]]
+    away = np.hypot(x - grip.center[0], y - grip.center[1])
+    deep = (np.abs(z - theirs) <= ALIKE * theirs) & (away <= 2 * grip.radius)
+    if not deep.any():
+        return grip.center, here, None
+    k = np.flatnonzero(deep.ravel())[away[deep].argmin()]
+    place = np.array([x.ravel()[k], y.ravel()[k]], float)
+    return place, float(z.ravel()[k]), theirs
+
+
+def _disc(z: np.ndarray, at: np.ndarray, grip: Grip) -> float:
+    """Depth of what is about a place [px], (2,), as far as the jaws reach [m]: the median there."""
+    y, x = np.mgrid[: z.shape[0], : z.shape[1]]
+    away = np.hypot(x - at[0], y - at[1])
+    return float(np.median(z[away <= max(DISC * grip.radius, away.min())]))
+
+
+def _at_jaws(depth: Depth, at: np.ndarray, grip: Grip, theirs: float) -> np.ndarray:
+    """How much farther off than as they closed, `theirs` [m], the jaws are [m], (T,), at places (T, 2) [px]."""
+    deep = np.array([_disc(z, p, grip) for z, p in zip(depth.z, at, strict=True)]) - theirs
+    held = slice(grip.begin, grip.end + 1)
+    deep[held] = gaussian_filter1d(median_filter(deep[held], 3, mode="nearest"), 1.5, mode="nearest")
+    deep[held] -= _fading(grip) * deep[grip.begin]
+    return deep
+
+
+def _fading(grip: Grip) -> np.ndarray:
+    """What is left, while it holds, of what smoothing or noise puts at its begin, where it is at rest, (F,)."""
+    return np.exp(-np.arange(grip.end + 1 - grip.begin) / 2.0)
 
 
 def _depth_at(depth: Depth, xy: np.ndarray) -> np.ndarray:
@@ -85,8 +141,7 @@ def _course(
     stretch = slice(grip.begin, grip.end + 1)
     across[stretch] = gaussian_filter1d(across[stretch], 0.7, axis=0, mode="nearest")
     along[stretch] = gaussian_filter1d(along[stretch], 1.5, axis=0, mode="nearest")
-    # It begins at rest: what smoothing or noise put there fades out over the first frames.
-    fade = np.exp(-np.arange(grip.end + 1 - grip.begin) / 2.0)
+    fade = _fading(grip)
     across[stretch] -= fade[:, None] * across[grip.begin]
     along[stretch] -= fade * along[grip.begin]
     return across, along
