@@ -99,6 +99,6 @@ def test_a_surrounding_that_goes_away_carries_the_edge(quick):
     assert found.motion.rim[:, -1] - found.motion.rim[:, 0] == pytest.approx(np.tile(AWAY, (patches, 1)), abs=1e-3)
     assert found.fit.held_out["fitted"] < 0.5 * found.fit.held_out["default"]
     # A body that hangs is fitted before it is compared with one that is held from below.
-    kinds = {h["base"]: h["cost"] for h in found.fit.history if h["round"] == "edge" and "grip" not in h}
-    assert set(kinds) == {True, False}
-    assert bool(found.body.held.any()) == (kinds[True] < kinds[False])
+    kinds = {h["as"]: h["cost"] for h in found.fit.history if h["round"] == "hold" and "grip" not in h}
+    assert {"carried edge", "hung"} <= set(kinds)
+    assert bool(found.body.held.any()) == (kinds["carried edge"] < kinds["hung"])

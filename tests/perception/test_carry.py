@@ -53,3 +53,36 @@ def test_the_course_of_a_way_is_that_of_the_tissue_around():
     share = way @ WAY[-1] / np.linalg.norm(WAY[-1]) / np.linalg.norm(way[-1])
     truth = WAY @ WAY[-1] / np.linalg.norm(WAY[-1]) ** 2
     assert np.sqrt(((share - truth) ** 2).mean()) < 0.02
+
+
+def beside_an_edge(source: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of a grip at (70, 50) on a lobe at .06 m, whose jaws close on what lies behind it at .1 m and lift that by .02 m
+    straight to the camera: its place at rest [px] and depth [m], and how its depth changes [m], (T,)."""
+    x = np.arange(W)[None, None]
+    z = np.broadcast_to(np.where(x < 75, 0.06, 0.1), (T, H, W)).astype(np.float32).copy()
+    z[2:, :, 55:90] = 0.1
+    z[:, :, 75:90] -= 0.02 * np.clip((np.arange(T) - 5) / 15, 0, 1)[:, None, None]
+    z[2:, :, 55:75] = z[2:, :, 75:76]
+    still = np.stack(np.meshgrid(np.arange(4.0, W, 6), np.arange(4.0, H, 6)), -1).reshape(-1, 1, 2).repeat(T, 1)
+    paths = Paths(still.astype(np.float32), np.ones(still.shape[:2], bool), np.full(still.shape[:2], 0.1, np.float32))
+    cam, grip = camera(W, H, T), Grip(np.array([70.0, 50.0]), 8.0, 3, T - 1, 1.0)
+    motion = carry([grip], paths, [None], Depth(z, np.ones_like(z), "known"), cam, source)
+    return (
+        cam.project(motion.center_rest)[0],
+        motion.center_rest[0, 2],
+        motion.position[0, :, 2] - motion.center_rest[0, 2],
+    )
+
+
+def test_beside_an_edge_of_depth_what_is_held_is_as_deep_as_the_jaws():
+    place, z, way = beside_an_edge("found")
+    assert place == pytest.approx([75, 50], abs=1)
+    assert z == pytest.approx(0.1, abs=1e-3)
+    assert way[-1] == pytest.approx(-0.02, abs=2e-3)
+    assert (np.diff(way[3:]) < 1e-4).all()
+
+
+def test_a_marked_place_is_taken_at_its_word():
+    place, z, _ = beside_an_edge("given")
+    assert place == pytest.approx([70, 50], abs=1e-6)
+    assert z == pytest.approx(0.06, abs=1e-6)

@@ -42,7 +42,7 @@ def carry(
     z = _depth_at(depth, paths.xy)
     center, radius, position, active = [], [], [], []
     for grip, step in zip(grips, jaws, strict=True):
-        middle, rest_z, theirs = _rest(grip, paths, depth)
+        middle, rest_z, theirs = _rest(grip, paths, depth, marked=source == "given")
         grip = replace(grip, center=middle)
         held = np.linalg.norm(paths.xy[:, 0] - grip.center, axis=-1)
         ring = held <= max(grip.radius, np.sort(held)[min(8, len(held) - 1)])
@@ -68,15 +68,16 @@ def carry(
     )
 
 
-def _rest(grip: Grip, paths: Paths, depth: Depth) -> tuple[np.ndarray, float, float | None]:
+def _rest(grip: Grip, paths: Paths, depth: Depth, marked: bool) -> tuple[np.ndarray, float, float | None]:
     """Where in frame 0 the held tissue lies [px], (2,), how deep [m], and beside an edge of depth how deep the jaws are
     as they close [m].
 
-    Beside one, a place a few pixels off is on other tissue: what jaws hold is as deep as they are when they close.
+    Beside one, a place a few pixels off is on other tissue: what jaws hold is as deep as they are when they close. A
+    place that was marked is taken at its word.
     """
     z = depth.z[0].astype(np.float32)
     here = float(sample(z, grip.center[None, None].astype(np.float32))[0, 0])
-    if not depth.follows:
+    if marked or not depth.follows:
         return grip.center, here, None
     near = np.argsort(np.linalg.norm(paths.xy[:, 0] - grip.center, axis=-1))[:9]
     closing = range(grip.begin, min(grip.begin + SHOWN, grip.end) + 1)
