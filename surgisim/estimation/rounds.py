@@ -175,7 +175,8 @@ def ask_hold(
     for names in (ONE_PIECE, IN_PIECES):
         cost, *found = min((fits[n] for n in names if n in fits), key=lambda fit: fit[0], default=(np.inf,))
         if cost < MOVED * least:
-            chosen, least = tuple(found), cost
+            chosen = tuple(found)
+        least = min(least, cost)
     return chosen
 
 
