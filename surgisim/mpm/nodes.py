@@ -89,13 +89,16 @@ class Nodes:
         return np.moveaxis((self.rule @ flat).reshape(-1, *u.shape[:-2], 3), 0, -2)
 
     def inherited(self, other: "Nodes", u: np.ndarray) -> np.ndarray:
-        """Nodal values of `other`, (A', 3), over these nodes, (A, 3): both copies start as the node did.
+        """Nodal values of `other`, (A', 3), over these nodes, (A, 3): a copy starts as it was, or as its node.
 
         Kinks keep their values where both have the same balls, and begin at zero elsewhere.
         """
         plain = self.rule.shape[1]
         new = np.zeros((len(self.place), 3), u.dtype)
-        new[:plain] = other.displaced(u)[self.place[:plain] % self.grid.count]
+        place = self.place[:plain]
+        there = np.diff(other.rule.indptr) > 0
+        kept = np.array([p < len(there) and there[p] for p in place], bool)
+        new[:plain] = other.displaced(u)[np.where(kept, place, place % self.grid.count)]
         if len(other.kinks.balls) == len(self.kinks.balls):
             new[plain:] = u[other.rule.shape[1] :]
         return new

@@ -59,6 +59,21 @@ def test_what_is_torn_stays_where_the_whole_is_dragged_along():
     assert left < 0.02 * dragged
 
 
+def test_a_torn_body_that_is_cut_elsewhere_goes_on_from_where_it_was():
+    body = replace(slab(), torn=WALL)
+    cut = Cut(np.array([0.018, -0.03, 0.06]), np.array([0.018, 0.03, 0.06]), 0.02)
+    before, after = (prepare(body, tuple(SOFT), density=1050.0, cut=c).simulator for c in (None, cut))
+    place = before.grid.positions()[before.place % before.grid.count]
+    # The two sides of the wall have gone opposite ways.
+    u = np.where(before.place < before.grid.count, 1.0, -1.0) * np.where(place[:, 0] > 0, 1.0, -1.0)
+    u = np.stack([1e-3 * u, np.zeros(len(u)), np.zeros(len(u))], 1)
+    rest = body.rest.astype(float)
+    away = np.abs(rest[:, 0] - 0.018) > 0.009
+    was, goes_on = before.carry(rest) @ u, after.carry(rest) @ after.inherited(before, u)
+    assert np.abs(was[:, 0]) == pytest.approx(1e-3, rel=1e-6)
+    assert goes_on[away] == pytest.approx(was[away], abs=1e-9)
+
+
 def test_a_torn_body_is_kept_and_one_from_before_is_whole(tmp_path):
     body = replace(slab(), torn=WALL)
     save(body, tmp_path / "torn.npz", producer="test", settings={}, code="")
