@@ -97,9 +97,7 @@ class Columns:
         pairs = cKDTree(self.xy[who]).query_pairs(self.spacing, output_type="ndarray")
         down = end.copy()
         for a, b in (who[pairs].T, who[pairs[:, ::-1]].T):
-            np.maximum.at(
-                down, a, np.where(self.above[b] > end[a] - self.spacing, self.above[b] + self.spacing, end[a])
-            )
+            np.maximum.at(down, a, np.where(self.above[b] > end[a], self.above[b] + self.spacing, end[a]))
         return down
 
     @property

@@ -87,6 +87,20 @@ def boxes_of(path: Path) -> np.ndarray:
     return np.array([[box["min"], box["max"]] for box in boxes], float).reshape(-1, 2, 3)
 
 
+def torn_of(path: Path) -> np.ndarray:
+    """fixed.json: both ends of each wall through which tissue does not hang together, (K, 2, 2); none if not named."""
+    walls = read_json(path).get("torn", [])
+    if not isinstance(walls, list):
+        raise Problem(f"{path}: 'torn' is {walls!r}, but a list of walls is wanted. Leave it out where there are none.")
+    for k, wall in enumerate(walls):
+        ends = (
+            isinstance(wall, list) and len(wall) == 2 and all(isinstance(end, list) and len(end) == 2 for end in wall)
+        )
+        if not ends or not all(_number(value) for end in wall for value in end):
+            raise Problem(f"{path}: wall {k} of 'torn' is {wall!r}, but two ends [x, y] are wanted.")
+    return np.array(walls, float).reshape(-1, 2, 2)
+
+
 def split_of(path: Path, frames: int) -> dict[str, tuple[int, int]]:
     """split.json: frames to fit and frames held out, first and one past the last, not overlapping."""
     body = read_json(path)

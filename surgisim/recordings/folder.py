@@ -4,7 +4,8 @@ recording.json  format, name, fps, frames, length_unit (m, cm or mm; of every fi
                 gravity_m_s2 [x, y, z] or null, tier; optional starts: "settled" (default) or "released";
                 astray: of how far a point has gone, how far its track is off, beside sigma
 rest.ply        closed triangle mesh of the body at rest
-fixed.json      {"boxes": [{"min": [x, y, z], "max": [x, y, z]}]}: regions of rest space held still
+fixed.json      {"boxes": [{"min": [x, y, z], "max": [x, y, z]}]}: regions of rest space held still;
+                optional torn: walls along z, [[x, y], [x, y]] each, through which the body does not hang together
 grip.npz        center_rest (J, 3), radius (J,), position (J, T, 3), active (J, T): translating grips; optional rim
                 (E, T, 3) and rim_radius (E,): balls of tissue that go along all the time with what is beyond the body
 tracks.npz      points (K, T, 3), NaN where unseen; visible (K, T); sigma (K,); optional place (K, 3) on the rest body,
@@ -26,7 +27,7 @@ from surgisim.artifacts.base import save_bytes
 from surgisim.artifacts.motion import Motion
 from surgisim.problem import Problem
 from surgisim.recordings.arrays import arrays
-from surgisim.recordings.facts import boxes_of, facts, split_of
+from surgisim.recordings.facts import boxes_of, facts, split_of, torn_of
 from surgisim.recordings.mesh import Mesh, closed
 from surgisim.recordings.ply import read_mesh, write_mesh
 from surgisim.recordings.recording import Recording, no_grips
@@ -93,6 +94,7 @@ def read_recording(folder: Path) -> Recording:
         fps=told["fps"],
         mesh=mesh,
         boxes=boxes_of(_there(folder / "fixed.json")) * unit,
+        torn=torn_of(folder / "fixed.json") * unit,
         points=np.where(visible[..., None], points, np.nan).astype(np.float32),
         visible=visible,
         sigma=tracks["sigma"].astype(float) * unit,
@@ -149,7 +151,7 @@ def encoded_recording(recording: Recording) -> dict[str, bytes]:
     files = {
         NAME: _json(told),
         "rest.ply": write_mesh(recording.mesh),
-        "fixed.json": _json({"boxes": boxes}),
+        "fixed.json": _json({"boxes": boxes} | ({"torn": recording.torn.tolist()} if len(recording.torn) else {})),
         "tracks.npz": _npz(tracks),
         "grip.npz": _npz(grips),
     }

@@ -71,6 +71,7 @@ def recording_of(
         doubts={str(name): moved[kept].astype(float) for name, moved in zip(doubts.names, doubts.moved, strict=True)},
         astray=ASTRAY,
         split=split,
+        torn=body.torn,
     )
 
 

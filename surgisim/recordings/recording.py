@@ -52,6 +52,8 @@ class Recording:
     """Of how far a point has gone, how far its track is off [1]."""
     split: dict[str, tuple[int, int]] | None = None
     """Frames `fit` and `held_out`, first and one past the last."""
+    torn: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    """Walls through which the body does not hang together, as `Body.torn`, (K, 2, 2) [m]."""
 
     def __post_init__(self) -> None:
         k, t = self.points.shape[:2] if self.points.ndim == 3 else (0, 0)
@@ -142,7 +144,8 @@ class Recording:
         Raises Problem where boxes that are drawn in hold nothing, or raised ones everything.
         """
         boxes = self.boxes + raised * np.array([-1.0, 1.0])[:, None]
-        return fill(self.mesh, spacing=spacing, boxes=boxes, where=f"recording {self.name}")
+        whole = fill(self.mesh, spacing=spacing, boxes=boxes, where=f"recording {self.name}")
+        return replace(whole, torn=self.torn)
 
 
 def no_grips(frames: int) -> Motion:

@@ -196,6 +196,8 @@ TEXTS = [
     ("fixed.json", "{}", "lacks a list 'boxes'"),
     ("fixed.json", '{"boxes": [{"min": [0, 0, 0]}]}', "box 0 is"),
     ("fixed.json", '{"boxes": [{"min": [0, 0, 1], "max": [1, 1, 0]}]}', "above its 'max'"),
+    ("fixed.json", '{"boxes": [], "torn": 3}', "'torn' is 3"),
+    ("fixed.json", '{"boxes": [], "torn": [[[0, 1], [2]]]}', "wall 0 of 'torn' is"),
     ("split.json", '{"fit": [0, 9], "held_out": [4, 6]}', r"'fit' is \[0, 9\]"),
     ("split.json", '{"fit": [0, 5], "held_out": [4, 6]}', "overlap"),
     ("split.json", '{"fit": [2, 2], "held_out": [4, 6]}', "leaves no frame to fit"),

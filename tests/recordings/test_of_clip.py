@@ -56,6 +56,16 @@ def test_a_clip_survives_the_way_through_a_folder(tmp_path):
     assert filled.held.mean() == pytest.approx(body.held.mean(), abs=0.1)
 
 
+def test_a_torn_clip_stays_torn(tmp_path):
+    body, *rest = clip()
+    walls = np.array([[[0.0, -0.01], [0.02, -0.01]], [[0.0, 0.01], [0.02, 0.01]]])
+    write_recording(recording_of("slab", dataclasses.replace(body, torn=walls), *rest), tmp_path / "torn")
+    assert read_recording(tmp_path / "torn").body(0.006).torn == pytest.approx(walls)
+    write_recording(recording_of("slab", body, *rest), tmp_path / "whole")
+    assert "torn" not in (tmp_path / "whole" / "fixed.json").read_text()
+    assert not len(read_recording(tmp_path / "whole").body(0.006).torn)
+
+
 def test_noise_across_and_along_the_view_survives_too(tmp_path):
     body, material, physics, tracks, *rest = clip()
     sigma = np.broadcast_to(np.float32([1e-4, 5e-4]), tracks.sigma_xyz.shape)
