@@ -194,9 +194,7 @@ def estimate(
         wide, wide_x = trial, x
         unsure = none(tracks)
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
-    loose = (
-        float(np.mean(trial.laying.columns.loose)) if trial.laying and trial.laying.columns.loose is not None else 0.0
-    )
+    loose = trial.laying.loose if trial.laying else 0.0
     depth = trial.depth(x)
 
     def alone(trial: Trial) -> Trial:

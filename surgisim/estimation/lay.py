@@ -199,6 +199,11 @@ class Laying:
         """The same with another edge."""
         return replace(self, margin=margin, rim=rim, kept={})
 
+    @property
+    def loose(self) -> float:
+        """Share of what is seen that nothing holds."""
+        return 0.0 if self.columns.loose is None else float(self.columns.loose.mean())
+
     def parted(self, loose: np.ndarray, walls: np.ndarray) -> Self:
         """The same in which nothing holds the `loose` columns from below, (N,) bool, nor anything across `walls`."""
         return replace(self, columns=replace(self.columns, loose=loose, torn=walls), kept={})

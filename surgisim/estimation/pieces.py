@@ -114,9 +114,7 @@ def _walls(
     there, trees = lattice.spread(np.ones(len(columns.xy), bool)), [cKDTree(rest[side]) for side in (lively, ~lively)]
     reach, walls = REACH * columns.spacing, []
     for axis in (0, 1):
-        first, second = (np.roll(a, -1, axis) for a in (loose, there)), (loose, there)
-        (loose_b, there_b), (loose_a, there_a) = first, second
-        border = (loose_a != loose_b) & there_a & there_b
+        border = (loose != np.roll(loose, -1, axis)) & there & np.roll(there, -1, axis)
         border[(-1, slice(None)) if axis == 0 else (slice(None), -1)] = False
         for cell in np.argwhere(border):
             middle = lattice.low + (cell + 0.5 * np.eye(2)[axis]) * lattice.pitch
