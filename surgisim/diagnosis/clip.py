@@ -6,6 +6,7 @@ import numpy as np
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.motion import Motion
+from surgisim.estimation.rim import Rim
 from surgisim.mpm.grip import runs
 from surgisim.mpm.setup import Prepared, prepare
 from surgisim.problem import Problem
@@ -61,6 +62,8 @@ class Clip:
     error: np.ndarray | None = None
     """What is then still left to what the finer grid shows, with which observed tracks are compared [m], (K, T, 3);
     None where that is not known."""
+    edge: Rim | None = None
+    """What the edge of the picture was seen to do, where that does not drive the body."""
 
     @property
     def frames(self) -> int:
@@ -200,6 +203,7 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
     share: spacing of the grid over the cube root of the body's volume. Raises Problem where fewer than 4 points
     remain, or where the recording has fewer than 8 frames to fit.
     """
+    recording, edge = _undriven(recording)
     motion = recording.motion
     spacing = spacing_of(recording.mesh, share)
     body = recording.body(float(spacing))
@@ -227,7 +231,21 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
     seen = recording.visible[kept].copy()
     moved = recording.points[kept].astype(float) - rest[kept][:, None]
     moved = np.where(seen[..., None], moved, 0.0)
-    return Clip(recording, body, kept, rest[kept], seen, moved, until, _normal(body, rest[kept]), device)
+    normal = _normal(body, rest[kept])
+    return Clip(recording, body, kept, rest[kept], seen, moved, until, normal, device, edge=edge)
+
+
+def _undriven(recording: Recording) -> tuple[Recording, Rim | None]:
+    """A recording of a video without what its edge does, and that, where something else holds the body too.
+
+    An edge that goes as tracks say carries into the body whatever moves the tissue, explained or not: breathing, a
+    weight, a push beside it. A simulation that looks like the recording wants that; what asks for the cause does not.
+    """
+    motion = recording.motion
+    if not (recording.doubts and len(motion.rim) and len(recording.boxes)):
+        return recording, None
+    edge = Rim(motion.rim, motion.rim_radius)
+    return replace(recording, motion=replace(motion, rim=None, rim_radius=None)), edge
 
 
 def spacing_of(mesh: Mesh, share: float) -> float:

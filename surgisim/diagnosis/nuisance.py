@@ -93,6 +93,7 @@ def of_laws(
     """What laws are fitted with: the same, and grips, held tissue and elastic laws that may be others."""
     near, moved = base.tangent, HELD * by_held(clip, base.x, base.simulated, memo)
     groups = [*other_bodies(clip, base, memo, workers), firmness(clip, near), path(clip, near), closing(clip, near)]
+    groups.append(perceived.edge(clip, near))
     if moved.any():
         groups.append(Group("held", moved[None], (("where what is held ends", HELD, "m"),)))
     gradient = displacement_gradient(base.prepared, clip, base.run)

@@ -9,6 +9,7 @@ import numpy as np
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.group import Group, none
 from surgisim.diagnosis.noise import Noise
+from surgisim.diagnosis.tangent import Tangent
 from surgisim.estimation.model_error import LEAST, alike
 
 SHAPE, BENT = 0.3, 0.1
@@ -34,13 +35,15 @@ BESIDE, MOST_JUMPS = 8, 200
 """Neighbours of a point, and jumps that are counted at most, the largest first."""
 FAINT = 0.1
 """Where tissue hardly moves, what a guessed body gets wrong is as large as where it goes this share of the farthest."""
+WIDE = 1.5
+"""Radii of a patch of the picture's edge within which points say what a push there does."""
 SLIGHT, MOST = 1.0, 400
 """Directions are left out where a standard deviation is worth less chi square than that, and beyond the first ones."""
 
 
 OF_TRACKS = ("astray", "jumps")
 """Groups of single tracks' errors."""
-BY_VIDEO = ("perception", "shape", "swing", *OF_TRACKS)
+BY_VIDEO = ("perception", "shape", "swing", "edge", *OF_TRACKS)
 """All groups."""
 
 
@@ -83,6 +86,41 @@ def swing(clip: Clip, simulated: np.ndarray, noise: Noise) -> Group:
     value, vector = np.linalg.eigh(np.sqrt(still)[:, None] * np.exp(-apart) * np.sqrt(still))
     kept = value > LEAST * value[-1]
     return Group("swing", _fields(clip, far, SWING * (vector[:, kept] * np.sqrt(value[kept])).T, noise))
+
+
+def edge(clip: Clip, near: Tangent) -> Group:
+    """Tissue beyond the picture that goes along with a pull, as a load at each patch of the edge in proportion to it.
+
+    What the edge does before tissue is touched, or once it is let go, is none of that. near: tangent of the base.
+    """
+    until = clip.until
+    if clip.edge is None or not clip.held[:until].any():
+        return none("edge", clip.moved)
+    grips = clip.motion
+    far = np.linalg.norm(grips.position - grips.center_rest[:, None], axis=-1) * grips.active
+    course = far.max(0)[:until]
+    course = course / max(course.max(), 1e-12)
+    # How far the edge goes with the pull, beside a constant.
+    basis = np.stack([course, np.ones(until)], 1)
+    gone = clip.edge.position[:, :until] - clip.edge.position[:, :1]
+    along = np.linalg.lstsq(basis, gone.transpose(1, 0, 2).reshape(until, -1), rcond=None)[0][0].reshape(-1, 3)
+    size = np.sqrt((along**2).sum(1).mean() / 2)
+    rest, columns = clip.body.rest.astype(float), []
+    for place, radius in zip(clip.edge.position[:, 0], clip.edge.radius, strict=True):
+        mine = np.exp(-0.5 * (np.linalg.norm(rest - place, axis=1) / radius) ** 2) * ~clip.body.held
+        if mine.sum() < 1e-6:
+            continue
+        loads = near.of_push(mine[None, :, None] * np.eye(3)[:, None])
+        states = near.at_states(np.broadcast_to(loads, (len(near.frames), *loads.shape)))
+        here = np.linalg.norm(clip.rest - place, axis=1)
+        beside = here <= max(WIDE * radius, here.min())
+        for d in range(3):
+            column = np.zeros_like(clip.moved)
+            column[:, :until] = near.over_time(states[:, d], course)
+            reach = np.linalg.norm(column[beside], axis=-1).max()
+            if reach > 0:
+                columns.append(size / reach * column)
+    return Group("edge", np.stack(columns)) if columns else none("edge", clip.moved)
 
 
 def astray(clip: Clip, noise: Noise) -> Group:

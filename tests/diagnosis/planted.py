@@ -1,6 +1,7 @@
 """A small block of tissue whose recording the engine itself makes, with a law planted or none."""
 
 import hashlib
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -74,6 +75,15 @@ TILT = {"gravity": {"x": 8.0, "y": 0.0, "z": 0.0, "onset": -1.0}}
 """Weight along x, from the first frame on [m/s^2]."""
 RUNS: Path | None = None
 """Where runs are kept; conftest.py sets it."""
+
+
+def edged(made: Recording) -> Recording:
+    """As a video's, in which the edge of what is seen goes along with the pull at four places, by .3 of it."""
+    pull = made.motion.position - made.motion.center_rest[:, None]
+    corners = np.array([[x, y, SIZE[2]] for x in (-0.014, 0.014) for y in (-0.011, 0.011)])
+    rim = corners[:, None] + 0.3 * pull * made.motion.active[..., None]
+    doubts = {"held.depth": 1e-5 * np.ones((*made.visible.shape, 3))}
+    return replace(made, doubts=doubts, motion=replace(made.motion, rim=rim, rim_radius=np.full(4, 0.004)))
 
 
 def memo_of(made: Recording) -> Memo:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import GRID, recording
+from planted import GRID, edged, plain, recording
 
 from surgisim.diagnosis import perceived
 from surgisim.diagnosis.clip import clip_of
@@ -87,3 +87,29 @@ def test_a_track_that_goes_astray_and_one_that_jumps_are_explained_and_tissue_th
     step = step * np.array([1.0, 0, 0])
     stepped = replace(clip, moved=(pulled + step) * clip.seen[..., None])
     assert len(perceived.jumps(stepped, noise_of(clip)).columns) == 0
+
+
+def test_an_edge_that_goes_with_the_pull_is_explained_and_one_that_moves_untouched_is_not(made):
+    clip, near = clip_of(edged(made), share=GRID), plain().base.tangent
+    group = perceived.edge(clip, near)
+    noise, until = noise_of(clip), clip.until
+    whiten = whitener(noise, clip.rest, clip.seen[:, :until])
+    space = metric(whiten(group.columns[:, :, :until]).T)
+
+    def left(field: np.ndarray) -> float:
+        z = whiten(field[:, :until])[:, None]
+        return float(space.gram(z, z)[0, 0] / (z**2).sum())
+
+    pulled = np.linalg.norm(clip.motion.position[0] - clip.motion.center_rest[0], axis=1) * clip.held
+    # A load near one of the patches, and none of theirs.
+    rest = clip.body.rest.astype(float)
+    beside = np.exp(-0.5 * (np.linalg.norm(rest - [0.0125, 0.0095, 0.012], axis=1) / 0.004) ** 2) * ~clip.body.held
+    loads = near.of_push(beside[None, :, None] * np.eye(3)[:1, None])
+    states = near.at_states(np.broadcast_to(loads, (len(near.frames), *loads.shape)))[:, 0]
+    with_pull = near.over_time(states, pulled[:until] / pulled.max())
+    with_pull *= 1e-3 / np.abs(with_pull).max()
+    assert left(with_pull) < 0.1
+    wave = near.over_time(states, np.sin(2 * np.pi * np.arange(until) / 6))
+    wave *= 1e-3 / np.abs(wave).max()
+    assert left(wave) > 0.8
+    assert not len(perceived.edge(clip_of(made, share=GRID), near).columns)
