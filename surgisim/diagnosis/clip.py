@@ -236,16 +236,36 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
 
 
 def _undriven(recording: Recording) -> tuple[Recording, Rim | None]:
-    """A recording of a video without what its edge does, and that, where something else holds the body too.
+    """A recording of a video without what moves its edge beside the pull; and the edge, where that drives nothing now.
 
     An edge that goes as tracks say carries into the body whatever moves the tissue, explained or not: breathing, a
     weight, a push beside it. A simulation that looks like the recording wants that; what asks for the cause does not.
+    What nothing but its edge holds is carried by that as far as it goes with the pull.
     """
     motion = recording.motion
-    if not (recording.doubts and len(motion.rim) and len(recording.boxes)):
+    if not (recording.doubts and len(motion.rim)):
         return recording, None
-    edge = Rim(motion.rim, motion.rim_radius)
-    return replace(recording, motion=replace(motion, rim=None, rim_radius=None)), edge
+    if len(recording.boxes):
+        bare = replace(motion, rim=None, rim_radius=None)
+        return replace(recording, motion=bare), Rim(motion.rim, motion.rim_radius)
+    course = pull_of(motion)
+    way = along(course, motion.rim, recording.fitted_until)
+    rim = motion.rim[:, :1] + course[None, :, None] * way[:, None]
+    return replace(recording, motion=replace(motion, rim=rim)), None
+
+
+def pull_of(motion: Motion) -> np.ndarray:
+    """How far grips have carried tissue in every frame, over the farthest, (T,)."""
+    way = np.linalg.norm(motion.position - motion.center_rest[:, None], axis=-1) * motion.active
+    far = way.max(0, initial=0.0)
+    return far / max(far.max(), 1e-12)
+
+
+def along(course: np.ndarray, path: np.ndarray, until: int) -> np.ndarray:
+    """How far paths [m], (E, T, 3), go with a course, (T,), beside a constant, in frames before `until`: (E, 3)."""
+    basis = np.stack([course[:until], np.ones(until)], 1)
+    gone = (path[:, :until] - path[:, :1]).transpose(1, 0, 2).reshape(until, -1)
+    return np.linalg.lstsq(basis, gone, rcond=None)[0][0].reshape(-1, 3)
 
 
 def spacing_of(mesh: Mesh, share: float) -> float:

@@ -6,7 +6,7 @@ tracks are off where tissue has gone somewhere. One that was measured has neithe
 
 import numpy as np
 
-from surgisim.diagnosis.clip import Clip
+from surgisim.diagnosis.clip import Clip, along, pull_of
 from surgisim.diagnosis.group import Group, none
 from surgisim.diagnosis.noise import Noise
 from surgisim.diagnosis.tangent import Tangent
@@ -96,15 +96,8 @@ def edge(clip: Clip, near: Tangent) -> Group:
     until = clip.until
     if clip.edge is None or not clip.held[:until].any():
         return none("edge", clip.moved)
-    grips = clip.motion
-    far = np.linalg.norm(grips.position - grips.center_rest[:, None], axis=-1) * grips.active
-    course = far.max(0)[:until]
-    course = course / max(course.max(), 1e-12)
-    # How far the edge goes with the pull, beside a constant.
-    basis = np.stack([course, np.ones(until)], 1)
-    gone = clip.edge.position[:, :until] - clip.edge.position[:, :1]
-    along = np.linalg.lstsq(basis, gone.transpose(1, 0, 2).reshape(until, -1), rcond=None)[0][0].reshape(-1, 3)
-    size = np.sqrt((along**2).sum(1).mean() / 2)
+    course = pull_of(clip.motion)
+    size = np.sqrt((along(course, clip.edge.position, until) ** 2).sum(1).mean() / 2)
     rest, columns = clip.body.rest.astype(float), []
     for place, radius in zip(clip.edge.position[:, 0], clip.edge.radius, strict=True):
         mine = np.exp(-0.5 * (np.linalg.norm(rest - place, axis=1) / radius) ** 2) * ~clip.body.held
@@ -116,7 +109,7 @@ def edge(clip: Clip, near: Tangent) -> Group:
         beside = here <= max(WIDE * radius, here.min())
         for d in range(3):
             column = np.zeros_like(clip.moved)
-            column[:, :until] = near.over_time(states[:, d], course)
+            column[:, :until] = near.over_time(states[:, d], course[:until])
             reach = np.linalg.norm(column[beside], axis=-1).max()
             if reach > 0:
                 columns.append(size / reach * column)
