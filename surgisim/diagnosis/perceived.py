@@ -36,7 +36,7 @@ BESIDE, MOST_JUMPS = 8, 200
 FAINT = 0.1
 """Where tissue hardly moves, what a guessed body gets wrong is as large as where it goes this share of the farthest."""
 WIDE = 1.5
-"""Radii of a patch of the picture's edge within which points say what a push there does."""
+"""Radii of a patch of the picture's edge within which points say what a push there does; chosen."""
 SLIGHT, MOST = 1.0, 400
 """Directions are left out where a standard deviation is worth less chi square than that, and beyond the first ones."""
 

@@ -171,8 +171,8 @@ def ask_hold(
         history.append({"round": "hold", "as": name, "without": number(without), "cost": number(cost)})
         fits[name] = cost, best, there
     chosen, least = (trial, x), without
-    # What is held by less, or is in pieces, has to be as much better again than what is plainer.
-    for names in (ONE_PIECE[:1], ONE_PIECE[1:], IN_PIECES):
+    # A body in pieces has to be as much better again than one in a single piece.
+    for names in (ONE_PIECE, IN_PIECES):
         cost, *found = min((fits[n] for n in names if n in fits), key=lambda fit: fit[0], default=(np.inf,))
         if cost < MOVED * least:
             chosen = tuple(found)
