@@ -10,6 +10,8 @@ from surgisim.diagnosis.hypothesis import Hypothesis
 
 KNOT = 0.18
 """Time between the knots of a free time course [s]."""
+MOMENT = 0.07
+"""Time between moments at which something is tried to set in [s]; chosen: in that time a load has half come."""
 APART = 0.0075
 """Distance between places that are tried [m], for a body of 36 mm; it follows the body's size."""
 
@@ -21,15 +23,15 @@ class Block:
     hypotheses: list[Hypothesis]
 
 
-def knots(clip: Clip) -> np.ndarray:
-    """[s], from the first fitted frame to the last."""
+def knots(clip: Clip, apart: float = KNOT) -> np.ndarray:
+    """[s], from the first fitted frame to the last, about so far apart, and no closer than frames."""
     last = (clip.until - 1) / clip.fps
-    return np.linspace(0, last, max(4, round(last / KNOT)))
+    return np.linspace(0, last, max(4, round(last / max(apart, 1 / clip.fps))))
 
 
-def hats(clip: Clip) -> np.ndarray:
-    """Piecewise linear courses, one a knot, (B, T)."""
-    at, time = knots(clip), clip.time[: clip.until]
+def hats(at: np.ndarray, clip: Clip) -> np.ndarray:
+    """Piecewise linear courses over the fitted frames, one a knot, (B, T)."""
+    time = clip.time[: clip.until]
     return np.stack([np.interp(time, at, e) for e in np.eye(len(at))])
 
 
@@ -72,9 +74,10 @@ def spread(course: np.ndarray) -> np.ndarray:
     return np.kron(np.eye(3), course[:, None])
 
 
-def moments(clip: Clip, count: int) -> np.ndarray:
+def moments(clip: Clip) -> np.ndarray:
+    """At which something is tried to set in [s]."""
     last = (clip.until - 1) / clip.fps
-    return np.linspace(0.0, 0.92 * last, count)
+    return np.linspace(0.0, 0.92 * last, max(2, round(0.92 * last / MOMENT)))
 
 
 def angles(direction: np.ndarray) -> tuple[float, float]:

@@ -43,6 +43,8 @@ class Explanation:
     """Whether the plain error of the frames held out falls with it by more than its interval."""
     rises: bool = False
     """Whether it rises by more than that."""
+    may_leave: float = calibration.PUSH_LEAVES
+    """Share of what a smooth field could explain that a push may leave."""
 
     @property
     def first(self) -> Refit:
@@ -62,7 +64,7 @@ class Explanation:
     def loose(self) -> bool:
         """Whether a push, which follows whatever comes and goes, leaves more than one that is there would."""
         law = candidates.of(self.first.finding.hypothesis)
-        return law.free_course and self.left > calibration.PUSH_LEAVES
+        return law.free_course and self.left > self.may_leave
 
     @property
     def drawn(self) -> bool:
@@ -152,7 +154,9 @@ def _judged_ahead(case: Case, fitted: Joint) -> Explanation:
     if guessed(case):
         # A guessed body is off by as much as noise everywhere: only beyond that a rise says something.
         rises = rises and rms(case, fitted.moved)[1] > noise_floor(case.noise)
-    return Explanation(fitted, fitted.refits[0].log_evidence, ahead, still(case, fitted.moved), out, falls, rises)
+    may_leave = 1 - calibration.HALF if guessed(case) else calibration.PUSH_LEAVES
+    left = still(case, fitted.moved)
+    return Explanation(fitted, fitted.refits[0].log_evidence, ahead, left, out, falls, rises, may_leave)
 
 
 def judged(
@@ -294,7 +298,7 @@ def _reason(
 
 def guessed(case: Case) -> bool:
     """Whether body and grips were read off a video."""
-    return bool(case.clip.recording.doubts)
+    return case.clip.recording.guessed
 
 
 def _reason_guessed(

@@ -15,7 +15,7 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import perceived
 from surgisim.diagnosis.base import HELD, Base, by_held, displacement_gradient, tracks_of
 from surgisim.diagnosis.clip import Clip
-from surgisim.diagnosis.form import hats, plane
+from surgisim.diagnosis.form import hats, knots, plane
 from surgisim.diagnosis.group import Group
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.noise import Noise, whitener
@@ -358,7 +358,7 @@ def path(clip: Clip, near) -> Group:
         active = clip.motion.active[j, : clip.until]
         if active.any():
             parts = _carried(clip, near, j)
-            courses = [bump * active for bump in hats(clip) if (bump * active).any()]
+            courses = [bump * active for bump in hats(knots(clip), clip) if (bump * active).any()]
             result += [PATH * parts[d] * course[None, :, None] for course in courses for d in range(3)]
     return Group("grip path", _to_the_end(result, clip))
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from surgisim.diagnosis.clip import Clip
-from surgisim.diagnosis.form import angles, hats, scale
+from surgisim.diagnosis.form import angles, hats, knots, scale
 from surgisim.diagnosis.hypothesis import RISE, Hypothesis
 from surgisim.diagnosis.law import NEVER
 from surgisim.diagnosis.look import Look
@@ -14,8 +14,11 @@ from surgisim.physics.place import Place
 
 BLOB = 0.0032
 """Extent of a push or a band that is tried [m], for a body of 36 mm; it follows the body's size."""
-SHIFTS = np.array([-0.1, -0.05, 0.0, 0.05, 0.1])
-"""By which moments are moved when a hypothesis is sharpened [s]."""
+KNOT = RISE / 2
+"""Time between the knots of a load's course [s]. With longer ones it comes and goes more slowly than a load does, which
+a sure recording tells from it."""
+SHIFTS = np.array([-0.08, -0.04, 0.0, 0.04, 0.08])
+"""By which moments are moved when a hypothesis is sharpened [s], times the step."""
 
 
 def places(look: Look) -> Iterator[tuple[str, Place]]:
@@ -31,6 +34,11 @@ def around(look: Look, h: Hypothesis, step: float) -> Iterator[Place]:
         yield Place(tuple(center), h.place.extent)
     for share in (0.7, 1.4):
         yield Place(h.place.center, share * h.place.extent)
+
+
+def times(clip: Clip) -> np.ndarray:
+    """The knots of a load's course [s], (B,)."""
+    return knots(clip, KNOT)
 
 
 def weight(look: Look, place: Place) -> np.ndarray:
@@ -53,7 +61,8 @@ def of_load(look: Look, loads: np.ndarray) -> np.ndarray:
     """The same by three nodal forces [N], (3, 3 A)."""
     near = look.base.tangent
     states = near.at_states(np.broadcast_to(loads, (len(near.frames), *loads.shape)))
-    return np.stack([near.over_time(states[:, d], bump) for d in range(3) for bump in hats(look.clip)])
+    courses = hats(times(look.clip), look.clip)
+    return np.stack([near.over_time(states[:, d], course) for d in range(3) for course in courses])
 
 
 def push(force: np.ndarray, onset: float, end: float | None) -> dict[str, float]:

@@ -85,6 +85,11 @@ class Recording:
         return self.points.shape[1]
 
     @property
+    def guessed(self) -> bool:
+        """Whether body and grips were read off a video."""
+        return bool(self.doubts)
+
+    @property
     def noise(self) -> np.ndarray:
         """Nominal noise of each point along each of its axes [m], (K, 3)."""
         return self.sigma[:, None] * (np.ones((1, 3)) if self.axes is None else self.axes)

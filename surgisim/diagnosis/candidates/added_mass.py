@@ -6,7 +6,7 @@ import numpy as np
 
 from surgisim.diagnosis import knobs, pushes
 from surgisim.diagnosis.candidate import Candidate, Parts, stronger
-from surgisim.diagnosis.form import Block, knots, moments, spread
+from surgisim.diagnosis.form import Block, moments, spread
 from surgisim.diagnosis.hypothesis import RISE, Hypothesis, ease
 from surgisim.diagnosis.law import Law
 from surgisim.diagnosis.look import Look
@@ -30,7 +30,7 @@ def light(h, amplitude, clip) -> Law:
 
 
 def _block(look: Look, place: Place, begins: np.ndarray) -> Block:
-    at, down = knots(look.clip), pushes.down(look.clip)
+    at, down = pushes.times(look.clip), pushes.down(look.clip)
     courses = [(onset, ease((at - onset) / RISE)) for onset in begins if onset >= 0]
     found = [
         Hypothesis(NAME, spread(course) @ down[:, None], 1, place, onset, None, {"down": down}, "blob")
@@ -42,12 +42,12 @@ def _block(look: Look, place: Place, begins: np.ndarray) -> Block:
 
 def tried(look: Look) -> Parts:
     for part, place in pushes.places(look):
-        yield part, lambda p=place: iter([_block(look, p, moments(look.clip, 22))])
+        yield part, lambda p=place: iter([_block(look, p, moments(look.clip))])
 
 
 def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:
     for place in pushes.around(look, h, step):
-        yield _block(look, place, h.onset + pushes.SHIFTS)
+        yield _block(look, place, h.onset + step * pushes.SHIFTS)
 
 
 CANDIDATE = Candidate(

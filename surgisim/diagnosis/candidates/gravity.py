@@ -6,7 +6,7 @@ import numpy as np
 
 from surgisim.diagnosis import knobs, pushes
 from surgisim.diagnosis.candidate import Candidate, Parts, stronger
-from surgisim.diagnosis.form import Block, knots, moments, spread
+from surgisim.diagnosis.form import Block, moments, spread
 from surgisim.diagnosis.hypothesis import RISE, Hypothesis, ease
 from surgisim.diagnosis.law import Law
 from surgisim.diagnosis.look import Look
@@ -22,13 +22,13 @@ def law(h, amplitude, clip) -> Law:
 def _block(look: Look, begins: np.ndarray) -> Block:
     each = np.full(len(look.rest), look.clip.density)
     columns = look.once("weight", None, lambda: pushes.of_force(look, each))
-    at = knots(look.clip)
+    at = pushes.times(look.clip)
     found = [Hypothesis(NAME, spread(ease((at - b) / RISE)), 0, None, b) for b in begins if b >= 0]
     return Block(columns, [h for h in found if h.mix.any()])
 
 
 def tried(look: Look) -> Parts:
-    yield "weight", lambda: iter([_block(look, moments(look.clip, 22))])
+    yield "weight", lambda: iter([_block(look, moments(look.clip))])
 
 
 def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:

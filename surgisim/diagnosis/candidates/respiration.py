@@ -9,7 +9,7 @@ import numpy as np
 from surgisim.diagnosis import knobs, pushes
 from surgisim.diagnosis.candidate import Candidate, Parts
 from surgisim.diagnosis.clip import Clip
-from surgisim.diagnosis.form import Block, angles, knots, spread
+from surgisim.diagnosis.form import Block, angles, spread
 from surgisim.diagnosis.hypothesis import Hypothesis, ease
 from surgisim.diagnosis.law import Law
 from surgisim.diagnosis.look import Look
@@ -51,7 +51,7 @@ def _breath(parts: np.ndarray, rate: float) -> dict[str, float]:
 def _block(look: Look, rates: Mapping[int, np.ndarray]) -> Block:
     """rates: for so many harmonics."""
     columns = look.once("base", None, lambda: pushes.of_load(look, look.base.tangent.anchored(0).T))
-    at, found = knots(look.clip), []
+    at, found = pushes.times(look.clip), []
     up = ease(at / SETS_IN)
     for harmonics, some in rates.items():
         for rate in some:
@@ -66,7 +66,7 @@ def _block(look: Look, rates: Mapping[int, np.ndarray]) -> Block:
 
 def tried(look: Look) -> Parts:
     if look.clip.body.held.any():
-        last = knots(look.clip)[-1]
+        last = pushes.times(look.clip)[-1]
         slowest = max(SLOWEST, SOME / last)
         # A sine needs half as many numbers, and pays less for them.
         rates = {1: np.geomspace(slowest, 2 * FASTEST, 20), 2: np.geomspace(slowest, FASTEST, 14)}

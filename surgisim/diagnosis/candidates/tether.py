@@ -6,7 +6,7 @@ import numpy as np
 
 from surgisim.diagnosis import knobs, pushes
 from surgisim.diagnosis.candidate import Candidate, Parts, stronger
-from surgisim.diagnosis.form import Block, angles, knots, scale
+from surgisim.diagnosis.form import Block, angles, scale
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.law import Law
 from surgisim.diagnosis.look import Look
@@ -30,7 +30,7 @@ def law(h, amplitude, clip) -> Law:
 
 def _block(look: Look, place: Place) -> Block:
     clip, near, term = look.clip, look.base.tangent, choose([NAME])[NAME]
-    frames = np.clip(np.round(knots(clip) * clip.fps).astype(int), 0, clip.until - 1)
+    frames = np.clip(np.round(pushes.times(clip) * clip.fps).astype(int), 0, clip.until - 1)
     weight = pushes.weight(look, place)
     mine = weight > 1e-3 * weight.max()
     share = weight[mine] * look.base.prepared.simulator.volume_p[mine]
