@@ -211,11 +211,16 @@ def stands(tried: list[Explanation]) -> Explanation:
     return tried[0]
 
 
+def likeness(case: Case) -> float:
+    """|cos| of whitened responses beyond which two laws do the same."""
+    return calibration.ALIKE_GUESSED if guessed(case) else calibration.ALIKE
+
+
 def alike(case: Case, chosen: Explanation, tried: list[Explanation], chances: dict[str, float]) -> tuple[Refit, ...]:
     """What a single law of a video may be instead: others that move a guessed body nearly as it does."""
     if len(chosen.fitted.refits) > 1:
         return ()
-    near = [r for r in _rivals(chosen, tried) if cos(case, chosen.first, r) > calibration.ALIKE]
+    near = [r for r in _rivals(chosen, tried) if cos(case, chosen.first, r) > likeness(case)]
     return tuple(sorted(near, key=lambda r: -chances[r.term]))
 
 
@@ -252,7 +257,7 @@ def simplest(case: Case, chosen: Explanation, tried: list[Explanation], chances:
         fewer = each.first.finding.hypothesis.mix.shape[1] < size
         sound = len(each.fitted.refits) == len(chosen.fitted.refits) == 1 and each.sound
         near = chances[each.first.term] > calibration.NEAR * chances[chosen.first.term]
-        if fewer and sound and near and cos(case, chosen.first, each.first) > calibration.ALIKE:
+        if fewer and sound and near and cos(case, chosen.first, each.first) > likeness(case):
             return each
     return chosen
 
@@ -308,18 +313,18 @@ def _reason_guessed(
     later: what errors.taken_off says of it.
 
     What a guessed body gets wrong is larger than noise and told from it; a law explains little of it, and nothing is
-    said then. One that is there takes most of the misfit away, also in frames held out, but not all of it.
+    said then. One that is there takes most of the misfit away, also in frames held out, but not all of it; where those
+    are off by no more than noise, the plain error of the fitted ones must bear it out.
     """
     free = not case.settings.calibrated
     certain = free or chosen.log_evidence >= calibration.CLEAR
-    if not (certain and chosen.enough and 1 - chosen.left >= calibration.HALF):
+    seen = free or later is not None or borne >= calibration.BORNE_OUT
+    if not (certain and seen and chosen.enough and 1 - chosen.left >= calibration.HALF):
         return "faint"
     doubts = {
-        "loose": chosen.loose,
         "drawn": chosen.drawn,
         "refuted": chosen.refuted,
         "unfit": later is not None and later < calibration.HALF,
-        "unbacked": later is None and not free and borne < calibration.BORNE_OUT,
         "unconfirmed": not ahead,
         "beaten": over is not None and over.refuted,
     }

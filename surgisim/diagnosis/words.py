@@ -48,7 +48,8 @@ def guessed(above: float) -> str:
     """Of a video, where no law says most of what is there."""
     return (
         "Simulation and recording differ by no more than noise, camera, discretisation and a body guessed from one "
-        "view explain: no law takes away half of what a smooth motion could. Effects above "
+        "view explain: no law takes away half of what a smooth motion could and is borne out by the "
+        "plain error. Effects above "
         f"{1e3 * above:.2g} mm RMS would have been seen on a known body."
     )
 

@@ -20,7 +20,12 @@ BETTER, WORSE, ALIKE, BLIND = (
     Gain(60.0, 30.0, 90.0, 70.0), Gain(-60.0, -90.0, -30.0, 70.0), Gain(5.0, -20.0, 30.0, 70.0), Gain(0.1, -1, 1, 2.0)
 )  # fmt: skip
 CASE, UNCALIBRATED = (
-    SimpleNamespace(settings=SimpleNamespace(calibrated=known), overstretched=False) for known in (True, False)
+    SimpleNamespace(
+        settings=SimpleNamespace(calibrated=known),
+        overstretched=False,
+        clip=SimpleNamespace(recording=SimpleNamespace(guessed=False)),
+    )
+    for known in (True, False)
 )
 
 
@@ -158,12 +163,21 @@ def two(more: int, chance: float, cos: float) -> tuple[Explanation, list[Explana
     return freer, [freer, fewer], {"hidden_contact": 1 - chance, "added_mass": chance}
 
 
-CASES = [(1, 0.35, 0.95, True), (1, 0.1, 0.95, False), (1, 0.35, 0.5, False), (3, 0.35, 0.95, False)]
+CASES = [
+    (1, 0.35, 0.95, False, True),
+    (1, 0.1, 0.95, False, False),
+    (1, 0.35, 0.5, False, False),
+    (3, 0.35, 0.95, False, False),
+    # A guessed body answers either somewhat otherwise.
+    (1, 0.35, 0.8, False, False),
+    (1, 0.35, 0.8, True, True),
+]
 
 
-@pytest.mark.parametrize(("more", "chance", "cos", "simpler"), CASES)
-def test_of_two_laws_that_do_the_same_the_simpler_comes_first(monkeypatch, more, chance, cos, simpler):
+@pytest.mark.parametrize(("more", "chance", "cos", "guessed", "simpler"), CASES)
+def test_of_two_laws_that_do_the_same_the_simpler_comes_first(monkeypatch, more, chance, cos, guessed, simpler):
     monkeypatch.setattr(judgement, "cos", lambda *_: cos)
+    monkeypatch.setattr(judgement, "guessed", lambda _: guessed)
     freer, tried, chances = two(more, chance, cos)
     assert judgement.simplest(CASE, freer, tried, chances) is tried[int(simpler)]
 
@@ -205,10 +219,13 @@ def test_a_tie_with_a_placebo_is_no_defeat():
         (explanation(left=0.3), True, -1.0, 0.9, "named"),
         (explanation(left=0.3), True, 0.9, 0.3, "unfit"),
         (explanation(left=0.3), True, 0.9, None, "named"),
-        (explanation(left=0.3), True, -1.0, None, "unbacked"),
+        # Nothing is said where neither does.
+        (explanation(left=0.3), True, -1.0, None, "faint"),
         (explanation(left=0.3), False, 0.9, 0.9, "unconfirmed"),
         (explanation(left=0.3, ahead=WORSE), True, 0.9, 0.9, "refuted"),
-        (explanation("hidden_contact", left=0.3, out=-0.8), True, 0.9, 0.9, "loose"),
+        # A push may leave what any law of a video may.
+        (explanation("hidden_contact", left=0.3, out=-0.8), True, 0.9, 0.9, "named"),
+        (explanation("hidden_contact", left=0.3, out=0.8), True, 0.9, 0.9, "drawn"),
     ],
 )
 def test_a_law_that_a_video_shows_takes_most_of_the_misfit(chosen, ahead, borne, later, said):
