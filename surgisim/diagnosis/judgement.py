@@ -23,7 +23,9 @@ from surgisim.diagnosis.prospect import Gain
 from surgisim.diagnosis.refit import Refit, kept
 from surgisim.diagnosis.saturated import SmoothFit
 
-REASONS = ("named", "faint", "loose", "drawn", "little", "unbacked", "unfit", "unconfirmed", "refuted", "beaten")
+REASONS = (
+    "named", "faint", "ungrasped", "loose", "drawn", "little", "unbacked", "unfit", "unconfirmed", "refuted", "beaten",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -316,6 +318,8 @@ def _reason_guessed(
     said then. One that is there takes most of the misfit away, also in frames held out, but not all of it; where those
     are off by no more than noise, the plain error of the fitted ones must bear it out.
     """
+    if not case.clip.held[: case.clip.until].any():
+        return "ungrasped"
     free = not case.settings.calibrated
     certain = free or chosen.log_evidence >= calibration.CLEAR
     seen = free or later is not None or borne >= calibration.BORNE_OUT

@@ -71,6 +71,8 @@ WHY = {
     "catalogue, or more than one thing",
     "loose": "a push follows whatever comes and goes, and this one leaves {left:.0f} % of what any smooth motion "
     "could explain: what is missing is another thing",
+    "ungrasped": "no grip was found in the video, so that nothing pulls the simulated tissue: mark it "
+    "(docs/grasps.md) before anything is read from what is left",
     "unbacked": "the plain error of the fitted frames does not fall by what it changes: noise and camera may not be "
     "quite what they are taken for",
     "unfit": "beside it the frames held out stay off by much more than noise: what is missing is not in the catalogue, "

@@ -87,7 +87,7 @@ class Recording:
     @property
     def guessed(self) -> bool:
         """Whether body and grips were read off a video."""
-        return bool(self.doubts)
+        return bool(self.doubts) or self.astray > 0
 
     @property
     def noise(self) -> np.ndarray:

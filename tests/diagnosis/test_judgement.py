@@ -23,7 +23,7 @@ CASE, UNCALIBRATED = (
     SimpleNamespace(
         settings=SimpleNamespace(calibrated=known),
         overstretched=False,
-        clip=SimpleNamespace(recording=SimpleNamespace(guessed=False)),
+        clip=SimpleNamespace(recording=SimpleNamespace(guessed=False), held=np.ones(4, bool), until=3),
     )
     for known in (True, False)
 )
@@ -230,3 +230,9 @@ def test_a_tie_with_a_placebo_is_no_defeat():
 )
 def test_a_law_that_a_video_shows_takes_most_of_the_misfit(chosen, ahead, borne, later, said):
     assert judgement._reason_guessed(CASE, chosen, ahead, borne, later, None) == said
+
+
+def test_a_video_in_which_nothing_is_seen_to_pull_names_nothing():
+    late = SimpleNamespace(**vars(CASE.clip) | {"held": np.arange(4) == 3})
+    case = SimpleNamespace(**vars(CASE) | {"clip": late})
+    assert judgement._reason_guessed(case, explanation(left=0.3), True, 0.9, 0.9, None) == "ungrasped"

@@ -78,6 +78,7 @@ def test_nothing_found_says_where_later_frames_differ_all_the_same():
     [
         ("little", "it leaves 40 % of what any smooth motion could explain"),
         ("unbacked", "the plain error of the fitted frames does not fall by what it changes"),
+        ("ungrasped", "no grip was found in the video"),
         ("loose", "a push follows whatever comes and goes, and this one leaves 40 %"),
         ("refuted", "the frames held out are farther off with it than without"),
         ("beaten", "the same law at a wrong place, or a wrong law, foretells the frames held out better"),

@@ -7,7 +7,7 @@ import pytest
 from pulled_sheet import camera
 
 from surgisim.lighting.headlight import log_brightness_change
-from surgisim.perception.depth.pull import Watched, nearer
+from surgisim.perception.depth.pull import Watched, _shared, nearer
 from surgisim.perception.depth.shading import Lattice
 from surgisim.perception.depth.soft_layer import SoftLayer
 
@@ -79,6 +79,14 @@ def test_a_view_that_slides_as_a_whole_brings_nothing_nearer(lattice, layer):
     rest, watched, _ = _pulled(lattice, layer, np.zeros(3))
     slid = watched.ray + 0.1 * COURSE[:, None, None]
     assert np.abs(nearer(lattice, rest, Watched(slid, watched.sure, watched.light, watched.lit))[0]).max() < 0.02
+
+
+def test_what_goes_farthest_is_the_whole_course_though_more_frames_go_a_little_the_other_way():
+    course = np.array([0.0, *[-0.4] * 12, 1.0])
+    pattern = np.random.default_rng(0).standard_normal((30, 2))
+    found, share, _ = _shared(course[:, None, None] * pattern, np.ones((len(course), 30)))
+    assert share == pytest.approx(course, abs=1e-3)
+    assert found == pytest.approx(pattern, abs=1e-2)
 
 
 def _pulled(lattice: Lattice, layer: SoftLayer, pull: np.ndarray) -> tuple[np.ndarray, Watched, np.ndarray]:

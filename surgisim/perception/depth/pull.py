@@ -167,7 +167,9 @@ def _shared(across: np.ndarray, sure: np.ndarray) -> tuple[np.ndarray, np.ndarra
         seen = (sure * course[:, None] ** 2).sum(0)
         pattern = (weight * course[:, None, None] * across).sum(0) / (seen + 1e-6)[:, None]
         course = (weight * across * pattern).sum((1, 2)) / ((weight * pattern**2).sum((1, 2)) + 1e-12)
-        size = max(np.abs(course).max(), 1e-12)
+        # What goes farthest may go the other way than what lasts longest.
+        size = course[np.abs(course).argmax()]
+        size = size if abs(size) > 1e-12 else 1e-12
         course, pattern = course / size, pattern * size
     return pattern, course, (sure * course[:, None] ** 2).sum(0) / max((course**2).sum(), 1e-12)
 
