@@ -24,10 +24,10 @@ class Hypothesis:
     end: float | None = None
     about: dict = field(default_factory=dict)
     """The other numbers of the form."""
-    outward: np.ndarray | None = None
-    """What its amplitudes, (H,), may not point along; None where any direction is possible."""
     scope: str = "everywhere"
     """What kind of place it was tried at: "everywhere", in a "blob", a "layer", a "patch" of the base, at a "grip"."""
+    outward: np.ndarray | None = None
+    """What its amplitudes, (H,), may not point along; None where any direction is possible."""
 
     @property
     def barred(self) -> np.ndarray | None:
