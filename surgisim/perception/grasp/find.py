@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from surgisim.perception.grasp.closing import closes
 from surgisim.perception.grasp.contact import distance
-from surgisim.perception.grasp.following import AROUND, Following, following, jaw_motion
+from surgisim.perception.grasp.following import AROUND, WINDOW, Following, following, jaw_motion
 from surgisim.perception.grasp.holding import began, held, let_go, recoiled, springs_back
 from surgisim.perception.grasp.instruments import Instrument
 from surgisim.perception.grasp.jaw_tissue import just_hidden, leading
@@ -94,8 +95,8 @@ def _grip(
     far = np.linalg.norm(course - course[begin], axis=-1)[begin : end + 1]
     top = begin + int(far.argmax())
     radius = _radius(start, xy[:, top] - xy[:, begin], center, side, cell)
-    alone = springs_back(course, follows, tool.tip, begin, end)
-    confidence = _confidence(xy, seen, at_jaws, follows, (begin, top, end), side, alone)
+    sure = springs_back(course, follows, tool.tip, begin, end) or closes(tool, begin, end, side)
+    confidence = _confidence(xy, seen, at_jaws, follows, (begin, top, end), side, sure)
     return Grip(center, radius, begin, end, confidence, float(far.max())), course
 
 
@@ -131,15 +132,18 @@ def _radius(start, moved: np.ndarray, center: np.ndarray, side: int, cell: float
     return float(np.clip(np.sqrt(area / np.pi), SMALL * side, REACH * side))
 
 
-def _confidence(xy, seen, at_jaws, follows: Following, times: tuple[int, int, int], side: int, alone: bool) -> float:
+def _confidence(xy, seen, at_jaws, follows: Following, times: tuple[int, int, int], side: int, sure: bool) -> float:
     """How sure it is that this is a grip, 0-1: far enough, together, and not as a camera that moves would show it.
 
-    Then all goes alike, and the jaws with it: here tissue strains about the grip, or springs back without the jaws.
+    Then all goes alike, and the jaws with it: here tissue strains about the grip. Or it springs back without the jaws,
+    or they are seen to close and open (`sure`).
     """
     begin, top, end = times
-    told = np.isfinite(follows.agreement[begin:end])
-    weight = np.where(told, follows.way[begin:end], 0.0)
-    together = float((weight * np.nan_to_num(follows.agreement[begin:end])).sum() / max(weight.sum(), 1e-9))
+    # What the last frames are compared with has been let go, and tissue that springs back goes faster than any pull.
+    inside = slice(begin, max(end - WINDOW, begin + 1))
+    told = np.isfinite(follows.agreement[inside])
+    weight = np.where(told, follows.way[inside], 0.0)
+    together = float((weight * np.nan_to_num(follows.agreement[inside])).sum() / max(weight.sum(), 1e-9))
     moved = np.linalg.norm(xy[:, top] - xy[:, begin], axis=-1)
     both = seen[:, begin] & seen[:, top]
     distance = np.minimum(at_jaws[:, begin], at_jaws[:, top])
@@ -149,7 +153,7 @@ def _confidence(xy, seen, at_jaws, follows: Following, times: tuple[int, int, in
     here = float(np.quantile(moved[near], 0.75)) if near.any() else 0.0
     there = float(np.median(moved[rest])) if rest.sum() > 10 else 0.0
     size = 1 - np.exp(-here / (WORTH * side))
-    strain = 1.0 if alone else np.clip(1.5 * (1 - there / max(here, 1e-9)), 0.0, 1.0)
+    strain = 1.0 if sure else np.clip(1.5 * (1 - there / max(here, 1e-9)), 0.0, 1.0)
     return float(np.clip(size * np.clip(1.5 * together, 0, 1) * strain * (0.5 + 0.5 * min(1.0, 4 * told.mean())), 0, 1))
 
 
