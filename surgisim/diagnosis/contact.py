@@ -12,24 +12,23 @@ INSIDE = 1e-4
 
 
 def outward(recording: Recording, place: Place, force: np.ndarray) -> float:
-    """How far a force, (3,), points out of the free surface around a place: 1 straight out, -1 straight in."""
-    size = float(np.linalg.norm(force))
-    return 0.0 if size == 0.0 else float(normal(free(recording), place) @ force / size)
+    """How far a force, (3,), points out of the free surface around a place: 1 straight out, -1 straight in.
 
-
-def normal(surface: tuple[np.ndarray, np.ndarray], place: Place) -> np.ndarray:
-    """Mean outward normal of a free surface around a place, (3,).
-
-    Where tissue is free on both sides, as a thin flap is, normals cancel, and any direction is a contact's: near 0. So
-    it is where no free surface is within reach, four extents.
+    The surface's outward normals are averaged over the place; what boxes hold does not count. Where tissue is free on
+    both sides, as a thin flap is, they cancel, and any direction is a contact's: near 0. So it is where no free surface
+    is within reach, four extents.
     """
-    points, normals = surface
+    points, normals = _free(recording)
     weight = place.weight(points)
     near = weight > np.exp(-8.0)
-    return (weight[near, None] * normals[near]).sum(0) / weight[near].sum() if near.any() else np.zeros(3)
+    size = float(np.linalg.norm(force))
+    if not near.any() or size == 0.0:
+        return 0.0
+    mean = (weight[near, None] * normals[near]).sum(0) / weight[near].sum()
+    return float(mean @ force / size)
 
 
-def free(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+def _free(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Points spread evenly over the surface that nothing holds [m], (N, 3), and the unit normals there, (N, 3)."""
     mesh, rng = recording.mesh, np.random.default_rng(0)
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)

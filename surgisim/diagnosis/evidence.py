@@ -5,11 +5,10 @@ N(0, L) beforehand,
 
     log B = 1/2 b^T (G + L^-1)^-1 b - 1/2 log det(1 + L^1/2 G L^1/2),   G = <S, S>, b = <S, r>
 
-and, where amplitudes may not point some way (one that must be positive, a contact that presses), plus log of the
-share of their posterior that does not over the prior's half. L gives every signature the RMS sizes of SIZES, equally
-likely. A law's evidence is the mean, over the scopes in which it was tried (everywhere, in a blob, in a layer), of the
-mean of B over the places, times and forms of that scope: a law that may be anywhere and anything pays for it, and the
-many places of a blob do not dilute what acts everywhere.
+and, where an amplitude must be positive, plus log of the share of its posterior above zero over the prior's half. L
+gives every signature the RMS sizes of SIZES, equally likely. A law's evidence is the mean, over the scopes in which it
+was tried (everywhere, in a blob, in a layer), of the mean of B over the places, times and forms of that scope: a law
+that may be anywhere and anything pays for it, and the many places of a blob do not dilute what acts everywhere.
 """
 
 from dataclasses import dataclass
@@ -65,15 +64,15 @@ def weigh(h: Hypothesis, gram: np.ndarray, shadow: np.ndarray, plain: np.ndarray
         y = L[:, None] * b
         x = np.linalg.solve(A, y)
         logs = 0.5 * (y * x).sum(0) - 0.5 * np.linalg.slogdet(A)[1]
-        spread, amplitude = np.linalg.inv(A), L * x[:, 0]
-        if h.barred is not None:
-            away = L * h.barred
-            along, variance = away @ x, away @ spread @ away
-            logs = logs + log_ndtr(-along / np.sqrt(variance)) + np.log(2)
-            amplitude = amplitude - L * (spread @ away) * max(along[0], 0.0) / variance
+        sd = np.sqrt(np.diag(np.linalg.inv(A)))
+        if h.sign and len(L) == 1:
+            logs = logs + log_ndtr(x[0] / sd[0]) + np.log(2)
         parts.append(logs)
         if best is None or logs[0] > best[0]:
-            best = (logs[0], amplitude, L * np.sqrt(np.diag(spread)))
+            amplitude = L * x[:, 0]
+            if h.sign and len(L) == 1:
+                amplitude = np.maximum(amplitude, 0)
+            best = (logs[0], amplitude, L * sd)
     logs = logsumexp(parts, axis=0) - np.log(len(SIZES))
     a = best[1]
     gain = float(2 * a @ b[:, 0] - a @ G @ a)

@@ -26,13 +26,6 @@ class Hypothesis:
     """The other numbers of the form."""
     scope: str = "everywhere"
     """What kind of place it was tried at: "everywhere", in a "blob", a "layer", a "patch" of the base, at a "grip"."""
-    outward: np.ndarray | None = None
-    """What its amplitudes, (H,), may not point along; None where any direction is possible."""
-
-    @property
-    def barred(self) -> np.ndarray | None:
-        """Direction of its amplitudes, (H,), along which they may not point."""
-        return -np.ones(1) if self.sign and self.mix.shape[1] == 1 else self.outward
 
     @property
     def in_blob(self) -> bool:

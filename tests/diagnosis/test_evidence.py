@@ -55,14 +55,3 @@ def test_the_many_places_of_one_scope_do_not_dilute_another(parts):
     blobs = [found(rng.standard_normal(400), residual, "law") for _ in range(50)]
     blobs = [replace(b, hypothesis=replace(b.hypothesis, scope="blob")) for b in blobs]
     assert alone - by_law([there, *blobs])["law"].evidence == pytest.approx(np.log(2), abs=0.05)
-
-
-@pytest.mark.parametrize(("barred", "wanted"), [((0.0, 1.0), True), ((1.0, 0.0), False)])
-def test_a_direction_that_amplitudes_may_not_have_counts_against_a_law_that_needs_it(parts, barred, wanted):
-    rng, s = parts
-    white = np.stack([s, rng.standard_normal(400)], 1)
-    residual = (0.6 * s + rng.standard_normal(400))[:, None]
-    law = Hypothesis("here", np.eye(2), outward=np.array(barred))
-    f = weigh(law, SPACE.gram(white, white), SPACE.gram(white, residual), 1e-8 * np.eye(2), 0)
-    assert (f.log_evidence > 20) == wanted
-    assert f.amplitude @ barred < 1e-12 if not wanted else f.amplitude[0] == pytest.approx(0.6, abs=0.2)

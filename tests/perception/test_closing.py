@@ -54,28 +54,25 @@ def test_jaws_close_stay_so_and_open(opening, said):
     assert closes(seen(opening), BEGIN, END, W) == said
 
 
-@pytest.mark.parametrize(("opening", "believed"), [(shut(BEGIN, END), True), (NEVER, False)])
-def test_tissue_that_slides_nearly_as_a_whole_is_held_where_jaws_close_on_it(opening, believed):
+def carried(opening: np.ndarray, least: float, way: np.ndarray) -> list:
+    """Grips where tissue goes the whole way at the jaws and `least` of it far from them."""
     tool, flow = forked(opening)
     x, y = np.meshgrid(np.arange(3.0, W, 4.0), np.arange(3.0, H, 4.0))
     start = np.stack([x.ravel(), y.ravel()], -1)
-    share = 0.7 + 0.3 * np.exp(-((np.linalg.norm(start - [66, 48], axis=-1) / 18) ** 2))
-    xy = start[:, None] + share[:, None, None] * WAY
+    share = least + (1 - least) * np.exp(-((np.linalg.norm(start - [66, 48], axis=-1) / 18) ** 2))
+    xy = start[:, None] + share[:, None, None] * way
     at = np.clip(np.rint(xy).astype(int), 0, [W - 1, H - 1])
     visible = ~tool[np.arange(T), at[..., 1], at[..., 0]]
-    grips = find(xy, visible, instruments(tool, np.ones((H, W), bool), flow), flow, W, 16.0)
-    assert any(g.confidence > LIKELY for g in grips) == believed
+    return find(xy, visible, instruments(tool, np.ones((H, W), bool), flow), flow, W, 16.0)
+
+
+@pytest.mark.parametrize(("opening", "believed"), [(shut(BEGIN, END), True), (NEVER, False)])
+def test_tissue_that_slides_nearly_as_a_whole_is_held_where_jaws_close_on_it(opening, believed):
+    assert any(g.confidence > LIKELY for g in carried(opening, 0.7, WAY)) == believed
 
 
 def test_what_springs_back_as_it_is_let_go_went_along_until_then():
-    tool, flow = forked(shut(BEGIN, END))
-    x, y = np.meshgrid(np.arange(3.0, W, 4.0), np.arange(3.0, H, 4.0))
-    start = np.stack([x.ravel(), y.ravel()], -1)
-    share = np.exp(-((np.linalg.norm(start - [66, 48], axis=-1) / 18) ** 2))
     back = np.where(np.arange(T) > END, -0.5, 1.0)[:, None]
-    xy = start[:, None] + share[:, None, None] * WAY * back
-    at = np.clip(np.rint(xy).astype(int), 0, [W - 1, H - 1])
-    visible = ~tool[np.arange(T), at[..., 1], at[..., 0]]
-    (grip,) = find(xy, visible, instruments(tool, np.ones((H, W), bool), flow), flow, W, 16.0)
+    (grip,) = carried(shut(BEGIN, END), 0.0, WAY * back)
     assert abs(grip.end - END) <= 1
     assert grip.confidence > 0.95

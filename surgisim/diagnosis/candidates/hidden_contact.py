@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from surgisim.diagnosis import calibration, contact, knobs, pushes
+from surgisim.diagnosis import knobs, pushes
 from surgisim.diagnosis.candidate import Candidate, Parts, stronger
 from surgisim.diagnosis.form import Block, moments, spread
 from surgisim.diagnosis.hypothesis import RISE, Hypothesis, ease
@@ -34,29 +34,15 @@ def course(at: np.ndarray, onset: float, end: float | None) -> np.ndarray:
 
 
 def _block(look: Look, place: Place, tried: list[tuple[float, float | None]]) -> Block:
-    at, out = pushes.times(look.clip), _out(look, place)
+    at = pushes.times(look.clip)
     found = []
     for onset, end in tried:
         # Up to constants a push that lets go after the last frame is one that stays.
         inside = end is None or (onset < end <= at[-1])
         shape = course(at, onset, end)
         if onset >= RISE and inside and shape.any():
-            found.append(Hypothesis(NAME, spread(shape), 0, place, onset, end, outward=out, scope="blob"))
+            found.append(Hypothesis(NAME, spread(shape), 0, place, onset, end, scope="blob"))
     return Block(pushes.columns(look, place), found)
-
-
-def _out(look: Look, place: Place) -> np.ndarray | None:
-    """Which way it cannot push, (3,), in a video; None where it may push any way.
-
-    A guessed body is carried more or less far than it is said to be as long as a grip holds it, so that a push from the
-    grasp to some moment and one the other way from then to the release look alike. In a body that is known they do not,
-    and what draws tissue out of it says that something else does (judgement.Explanation.drawn).
-    """
-    recording = look.clip.recording
-    if not recording.guessed:
-        return None
-    out = contact.normal(look.once("surface", None, lambda: contact.free(recording)), place)
-    return out if np.linalg.norm(out) > calibration.PULLS else None
 
 
 def tried(look: Look) -> Parts:
