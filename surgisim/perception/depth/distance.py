@@ -12,6 +12,7 @@ from surgisim.artifacts.inpainted import SEEN, Inpainted
 from surgisim.artifacts.masks import Masks
 from surgisim.config import depth as config
 from surgisim.perception.depth import depth_anything, given, near_light, stereo
+from surgisim.perception.depth.outline import outlines
 from surgisim.problem import Problem
 
 FLAT = 0.1
@@ -55,6 +56,7 @@ def depth(
             distance=settings.distance,
             relief=settings.relief,
             size=settings.lattice,
+            tools=outlines(frames.rgb, masks.tool, camera),
             progress=progress,
         )
         scale = "arbitrary"

@@ -8,11 +8,11 @@ With w = log z on the image, X = (x - cx) / fx, Y alike and r = (X, Y, 1), that 
 (perspective near-light shading; Prados and Faugeras, Shape from shading: a well-posed problem?, CVPR 2005).
 In frame 0 albedo and shape share the blame: what goes with the hue is albedo, what is smooth is mostly shape.
 Afterwards the albedo travels with the tissue: a change of brightness along its way is a change of distance and slant,
-and with the motion seen across the view it tells how far pulled tissue comes nearer (pull.py). The absolute size is not
-known: the median depth of frame 0 is set to a nominal one.
+and with the motion seen across the view, the instrument's too, it tells how far pulled tissue comes nearer (pull.py).
+The absolute size is not known: the median depth of frame 0 is set to a nominal one.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -21,6 +21,7 @@ import numpy as np
 from surgisim.artifacts.camera import Camera
 from surgisim.lighting.headlight import linear_light
 from surgisim.lighting.veil import ABOVE, veil_of
+from surgisim.perception.depth.outline import Outline
 from surgisim.perception.depth.pull import Watched, nearer
 from surgisim.perception.depth.shading import Lattice, explain, shading
 from surgisim.perception.tracking.spread import spread
@@ -59,13 +60,14 @@ def estimate(
     distance: float = 0.07,
     size: int = 64,
     relief: float = 0.3,
+    tools: Sequence[Outline] = (),
     progress: Callable[[float, float, str], None] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Depth [m] and confidence 0-1 of a recording without its instrument, (T, H, W) float32 each.
 
     rgb: sRGB, (T, H, W, 3) uint8. hidden: pixels whose colour is not the tissue's at that time, specular: highlights,
     (T, H, W) bool. distance: median depth of frame 0 [m]. size: longer side of the lattice it is solved on [px].
-    relief: expected spread of log depth in frame 0 about its mean slope.
+    relief: expected spread of log depth in frame 0 about its mean slope. tools: the instruments, as they are seen.
     """
     ratio = min(1.0, size / max(rgb.shape[1:3]))
     lattice = Lattice.of(camera, ratio)
@@ -84,7 +86,7 @@ def estimate(
         if progress:
             progress(t + 1, 2 * len(rgb), "light along the tissue's way")
     z, confidence, origin = [], [], lattice.pixels
-    changes, places = nearer(lattice, rest, Watched(*map(np.stack, zip(*watched, strict=True))))
+    changes, places = nearer(lattice, rest, Watched(*map(np.stack, zip(*watched, strict=True))), tools)
     for t, (frame, change, place) in enumerate(zip(frames, changes, places, strict=True)):
         position = (place.reshape(lattice.ray.shape) - lattice.ray[0, 0]) / (lattice.ray[1, 1] - lattice.ray[0, 0])
         look = _look(lattice, position, *frame, rest, albedo, origin, ratio * camera.fx)

@@ -2,18 +2,19 @@
 
 Tissue that jaws carry off takes its surroundings along as a soft layer does (soft_layer.py): place and size of the held
 ball, the layer's thickness and the pull decide the motion of the whole surface, along the view too. These few numbers
-are fitted to the motion seen across the view, which tells most of them, and to the change of brightness, which tells
-best how far the surface turns and comes nearer. First to the pattern that most of the recording's motion shares; then,
-with place and size kept, to every frame.
+are fitted to the motion seen across the view, which tells most of them, to the change of brightness, which tells
+best how far the surface turns and comes nearer, and to how the instrument goes that holds the ball (outline.py). First
+to the pattern that most of the recording's motion shares; then, with place and size kept, to every frame.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from surgisim.lighting.headlight import MATTE
+from surgisim.perception.depth.outline import PARTS, Outline
 from surgisim.perception.depth.shading import Lattice
 from surgisim.perception.depth.soft_layer import SoftLayer
 
@@ -48,6 +49,14 @@ STARTS = (0.1, 1.0)
 """Angles of the pull that the fit begins with [rad]."""
 STEADY, LOOSE = 0.15, 0.03
 """Spread of a frame's pull about the shared one times the frame's share; as a share of the whole pull."""
+BEGUN = 0.15
+"""Share of the largest motion from which on, up to the last fully pulled frame, jaws are known to hold the tissue."""
+REACHES = 0.2
+"""Farthest from the liveliest tissue, once pulled, that the tip of its instrument may be, a share of the distance."""
+TIP, WIDTH = 0.3, 0.01
+"""Least errors of where an outline's tip is [px of the lattice], and of the logarithm of how wide it is."""
+FEW = 5
+"""Frames that tell how an instrument goes."""
 VISIBLE = 0.5
 """Motion across the view below which nothing is said to be pulled [px of the lattice]."""
 STEPS = np.array([0.004, 0.004, 0.03, 0.05, 0.003, 0.003, 0.003, 0.01, 0.01, 0.02])
@@ -87,13 +96,31 @@ class _Scene:
     weight_across: np.ndarray
     """1 / standard deviation, of which ALIKE go together, (K,)."""
     weight_light: np.ndarray
+    jaws: np.ndarray
+    """How far the held ball has gone by its instrument: X and Y of (X, Y, 1) and log depth, (3,); NaN if unknown."""
+    weight_jaws: np.ndarray
+    """1 / standard deviation, (3,)."""
 
 
-def nearer(lattice: Lattice, rest: np.ndarray, watched: Watched) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True)
+class _Carried:
+    """How far an instrument's tip goes: X and Y of (X, Y, 1) and the logarithm of its distance; NaN if unknown."""
+
+    whole: np.ndarray
+    """By the whole pull, (3,)."""
+    each: np.ndarray
+    """In every frame, (T, 3)."""
+    error: np.ndarray
+    """Standard deviations, (3,)."""
+
+
+def nearer(
+    lattice: Lattice, rest: np.ndarray, watched: Watched, tools: Sequence[Outline] = ()
+) -> tuple[np.ndarray, np.ndarray]:
     """Change of log depth of frame 0's tissue by a pull, (T, h, w), 0 where nothing is seen to move; and its place.
 
     The place is X and Y of (X, Y, 1), (T, K, 2): as seen where that is sure, else as the layer has it.
-    rest: log depth in frame 0, (h, w).
+    rest: log depth in frame 0, (h, w). tools: the instruments, one of which may hold the tissue.
     """
     scale = np.median(rest)
     z = np.exp(rest - scale).ravel()
@@ -116,6 +143,8 @@ def nearer(lattice: Lattice, rest: np.ndarray, watched: Watched) -> tuple[np.nda
     noise = np.hypot(np.hypot(ACROSS * pixel, SHAPE * around), FAR * largest) * np.sqrt(ALIKE)
     lively = (around > LIVELY * largest) / np.sqrt(ALIKE)
     full = course > FULL
+    liveliest = np.argmax(around)
+    jaws = _carried(tools, course, watched.ray[full][:, liveliest].mean(0), everywhere[:, 0], pixel)
     scene = _Scene(
         lattice,
         SoftLayer.solved(),
@@ -126,8 +155,10 @@ def nearer(lattice: Lattice, rest: np.ndarray, watched: Watched) -> tuple[np.nda
         (lit[full] * brighter[full]).sum(0) / np.maximum(lit[full].sum(0), 1e-6),
         np.sqrt(sure) / noise,
         lit[full].mean(0) * lively / np.hypot(LIGHT, np.median(restless[full])),
+        jaws.whole,
+        1 / jaws.error,
     )
-    best = _fitted(scene, tissue[np.argmax(around), :2], pattern)
+    best = _fitted(scene, tissue[liveliest, :2], pattern)
     place = watched.ray.copy()
     for t, share in enumerate(course):
         now = replace(
@@ -137,12 +168,46 @@ def nearer(lattice: Lattice, rest: np.ndarray, watched: Watched) -> tuple[np.nda
             brighter=brighter[t],
             weight_across=np.where(watched.sure[t] > CLEAR, watched.sure[t], 0.0) / noise,
             weight_light=lit[t] * lively / np.hypot(LIGHT, restless[t]),
+            jaws=jaws.each[t],
         )
         moved, explained = _moved(now, best, share)
         change[t] = np.log1p(np.maximum(explained * moved[:, 2] / z, -0.8)).reshape(lattice.shape)
         layer = (tissue + moved)[:, :2] / (tissue + moved)[:, 2:] + everywhere[t] / z[:, None]
         place[t] += explained * (1 - watched.sure[t])[:, None] * (layer - place[t])
     return change, place
+
+
+def _carried(
+    tools: Sequence[Outline], course: np.ndarray, place: np.ndarray, everywhere: np.ndarray, pixel: float
+) -> _Carried:
+    """How the tip goes of the instrument that is nearest to `place` (2,), where the pulled tissue is in the end.
+
+    Along the pull, what its way shares with the tissue's course (T,); before it closed and after it let go it is on its
+    own. everywhere: motion of the whole view, (T, 2).
+    """
+    unknown = _Carried(np.full(3, np.nan), np.full((len(course), 3), np.nan), np.ones(3))
+    full = np.flatnonzero(course > FULL)
+    frames = np.arange(np.flatnonzero(course > BEGUN)[0], full[-1] + 1)
+    away = [np.median(np.linalg.norm(tool.ray(full) - place, axis=-1)) for tool in tools]
+    if not np.nanmin([*away, np.inf]) < REACHES:
+        return unknown
+    tool = tools[np.nanargmin(away)]
+    way = tool.carried(frames, frames[-1] - len(frames) // 4)
+    seen = np.isfinite(way).all((0, 2))
+    if seen.sum() < FEW:
+        return unknown
+    frames, way = frames[seen], way[:, seen]
+    way[..., :2] -= everywhere[frames]
+    share = course[frames] - course[frames].mean()
+    by_mask = tool.ray(frames) - everywhere[frames]
+    size = share @ share
+    ways = np.einsum("f,pfa->pa", share, way) / size
+    # Without its tip an outline does not tell where it ends; where the mask ends is told another way.
+    apart = np.linalg.norm(ways[0, :2] - share @ by_mask / size)
+    spread = np.sqrt((PARTS - 1) * ways[1:, 2].var())
+    each = unknown.each
+    each[frames] = way[0] - way[0].mean(0) + ways[0] * course[frames].mean()
+    return _Carried(ways[0], each, np.array([*[np.hypot(apart, TIP * pixel)] * 2, np.hypot(spread, WIDTH)]))
 
 
 def _everywhere(across: np.ndarray) -> np.ndarray:
@@ -218,7 +283,7 @@ def _moved(scene: _Scene, best: np.ndarray, share: float) -> tuple[np.ndarray, f
 
     def misfit(pull: np.ndarray) -> np.ndarray:
         data = _compared(scene, tissue, unit @ pull, best[9])
-        return np.concatenate([data, (pull - share * whole) / spread])
+        return np.concatenate([data, (pull - share * whole) / spread, _beside_jaws(scene, best, pull)])
 
     moved = unit @ _least_squares(misfit, share * whole, STEPS[4:7])[1]
     left = scene.weight_across * np.linalg.norm(_across(scene, moved), axis=-1)
@@ -230,12 +295,25 @@ def _body(scene: _Scene, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The tilted tissue (K, 3), and its displacement by each unit of pull (K, 3, 3)."""
     tissue, flat = scene.rest.copy(), scene.rest[:, :2]
     tissue[:, 2] += (flat - flat.mean(0)) @ v[7:9]
-    slope = scene.slope + v[7:9]
-    axes = _axes(slope)
-    nearest = np.argmin(((flat - v[:2]) ** 2).sum(1))
-    center = np.array([*v[:2], tissue[nearest, 2] + slope @ (v[:2] - flat[nearest])])
-    at = (tissue - center) @ axes[:2].T / np.exp(v[2])
+    axes = _axes(scene.slope + v[7:9])
+    at = (tissue - _middle(scene, v)) @ axes[:2].T / np.exp(v[2])
     return tissue, axes.T @ scene.layer.carried(at, np.exp(v[3]))
+
+
+def _middle(scene: _Scene, v: np.ndarray) -> np.ndarray:
+    """The held ball's, on the tilted tissue, (3,)."""
+    flat = scene.rest[:, :2]
+    nearest = np.argmin(((flat - v[:2]) ** 2).sum(1))
+    deep = scene.rest[nearest, 2] + (flat[nearest] - flat.mean(0)) @ v[7:9]
+    return np.array([*v[:2], deep + (scene.slope + v[7:9]) @ (v[:2] - flat[nearest])])
+
+
+def _beside_jaws(scene: _Scene, v: np.ndarray, pull: np.ndarray) -> np.ndarray:
+    """Weighted differences, the held ball's way less its instrument's, (3,); 0 where that is unknown."""
+    rest = _middle(scene, v)
+    held = rest + _axes(scene.slope + v[7:9]).T @ pull
+    gone = np.array([*(held[:2] / held[2] - rest[:2] / rest[2]), np.log(max(held[2] / rest[2], 0.2))])
+    return _less_far(np.where(np.isfinite(scene.jaws), (gone - scene.jaws) * scene.weight_jaws, 0.0), ROBUST)
 
 
 def _axes(slope: np.ndarray) -> np.ndarray:
@@ -256,6 +334,7 @@ def _misfit(scene: _Scene, v: np.ndarray, center: np.ndarray) -> np.ndarray:
         v[7] / TILT,
         v[8] / TILT,
         (v[9] - MATTE) / MATTE_SPREAD,
+        *_beside_jaws(scene, v, v[4:7]),
     ]
     return np.concatenate([_compared(scene, tissue, unit @ v[4:7], v[9]), expected])
 
@@ -266,7 +345,12 @@ def _compared(scene: _Scene, tissue: np.ndarray, moved: np.ndarray, matte: float
     shape = scene.lattice.shape
     light = matte * (_brightness(tissue + moved, shape) - _brightness(tissue, shape)) - scene.brighter
     rest = np.concatenate([(across * scene.weight_across[:, None]).ravel(), light * scene.weight_light])
-    far, limit = np.abs(rest), ROBUST / np.sqrt(ALIKE)
+    return _less_far(rest, ROBUST / np.sqrt(ALIKE))
+
+
+def _less_far(rest: np.ndarray, limit: float) -> np.ndarray:
+    """Differences whose squares grow linearly beyond the limit."""
+    far = np.abs(rest)
     return np.sign(rest) * np.sqrt(np.where(far < limit, far**2, 2 * limit * far - limit**2))
 
 
