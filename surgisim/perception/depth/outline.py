@@ -18,6 +18,7 @@ from surgisim.artifacts.camera import Camera
 from surgisim.perception.flow import dense_flow
 from surgisim.perception.grasp.instruments import Instrument, instruments
 from surgisim.perception.masking.appearance import lit
+from surgisim.perception.tracking.between import sample
 
 REACH = 0.4
 """How far behind the tip the outline is looked at, as a share of the longer image side."""
@@ -122,10 +123,10 @@ def _between_pixels(rgb: np.ndarray, mask: np.ndarray, place: np.ndarray) -> tup
     inward = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
     outward = cv2.distanceTransform(1 - mask.astype(np.uint8), cv2.DIST_L2, 5)
     away = cv2.GaussianBlur(outward - inward, (0, 0), 1.5)
-    slope = cv2.Sobel(away, cv2.CV_32F, 1, 0), cv2.Sobel(away, cv2.CV_32F, 0, 1)
-    normal = np.stack([_read(s, place) for s in slope], -1)
+    slope = np.stack([cv2.Sobel(away, cv2.CV_32F, 1, 0), cv2.Sobel(away, cv2.CV_32F, 0, 1)], -1)
+    normal = sample(slope, place).astype(float)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-    profile = _read(rgb.astype(np.float32), place[:, None] + PROFILE[:, None] * normal[:, None])
+    profile = sample(rgb.astype(np.float32), place[:, None] + PROFILE[:, None] * normal[:, None]).astype(float)
     inside, outside = profile[:, PROFILE <= -2], profile[:, PROFILE >= 2]
     change = outside.mean(1) - inside.mean(1)
     size = (change**2).sum(-1)
@@ -134,7 +135,7 @@ def _between_pixels(rgb: np.ndarray, mask: np.ndarray, place: np.ndarray) -> tup
     gap = PROFILE[1] - PROFILE[0]
     at = PROFILE[:-1] - gap * before / np.where(after > before, after - before, 1.0)
     at = np.where((before < 0) & (after >= 0), at, np.inf)
-    nearest = at[np.arange(len(at)), np.abs(at).argmin(1)] if len(at) else np.zeros(0)
+    nearest = np.take_along_axis(at, np.abs(at).argmin(1)[:, None], 1)[:, 0]
     rough = inside.var(1).sum(-1) + outside.var(1).sum(-1)
     clear = (np.abs(nearest) < 3) & (size > rough)
     return place[clear] + nearest[clear, None] * normal[clear], normal[clear]
@@ -182,10 +183,3 @@ def _laid(edge: np.ndarray, onto: np.ndarray, start: np.ndarray, side: int) -> n
         if turn > 12 and np.abs(step * [1, 1, 30, 30, 30]).max() < CLOSE:
             break
     return at
-
-
-def _read(field: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """A picture (H, W) or (H, W, C) between its pixels, at places (..., 2)."""
-    flat = place.reshape(-1, 1, 2).astype(np.float32)
-    out = cv2.remap(field, flat[..., 0], flat[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return out.reshape(*place.shape[:-1], *field.shape[2:]).astype(float)
