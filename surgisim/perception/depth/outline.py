@@ -35,6 +35,8 @@ TURN, SLIDE, STRETCH, GROW = 0.5, 0.1, 0.1, 0.5
 along the shaft over that across it, growth across it (logarithms)."""
 PARTS = 4
 """Stretches of an outline, one behind the other, that are compared with each other."""
+ALONE = np.array([1e-3, 2.0, 1e-5, 0.5, 0.5])
+"""Spreads of the same numbers for a stretch alone, about those of the whole: it may grow, stretch, and lie beside it [px]."""
 CLOSE = 1e-3
 """A step that ends the search [px]; of angles and growths a thirtieth."""
 
@@ -58,9 +60,10 @@ class Outline:
 
     def carried(self, frames: np.ndarray, reference: int) -> np.ndarray:
         """The ray of the reference frame's tip in others, and the logarithm of its distance there, less that in the
-        reference, (1 + PARTS, F, 3): by the whole outline, and without each stretch of it; NaN where none is seen."""
-        out = np.stack([self._carried(t, reference) for t in frames], 1)
-        return np.concatenate([self._ray(out[..., :2]), out[..., 2:]], -1)
+        reference: by the whole outline, and that distance by every stretch of it alone, (F, 3 + PARTS); NaN where none
+        is seen."""
+        out = np.stack([self._carried(t, reference) for t in frames])
+        return np.concatenate([self._ray(out[:, :2]), out[:, 2:]], -1)
 
     def _ray(self, pixel: np.ndarray) -> np.ndarray:
         camera = self.camera
@@ -69,20 +72,17 @@ class Outline:
     def _carried(self, t: int, reference: int) -> np.ndarray:
         edge, onto = self.edge[t], self.edge[reference]
         if min(len(edge), len(onto)) < FIRM:
-            return np.full((1 + PARTS, 3), np.nan)
+            return np.full(3 + PARTS, np.nan)
         side = max(self.camera.width, self.camera.height)
-        laid = _laid(edge, onto, np.zeros(5), side)
+        laid = _laid(edge, onto, np.zeros(5), np.array([SLIDE * side, SLIDE * side, TURN, GROW, STRETCH]))
         part = np.clip((PARTS * edge[:, 0] / max(edge[:, 0].max(), 1e-9)).astype(int), 0, PARTS - 1)
-        every = [laid, *(_laid(edge[part != p], onto, laid, side) for p in range(PARTS))]
-        return np.array([self._back(t, at) for at in every])
-
-    def _back(self, t: int, at: np.ndarray) -> np.ndarray:
-        """Where an outline that was laid onto the reference's has its tip [px], and how much farther off it is."""
-        cos, sin = np.cos(at[2]), np.sin(at[2])
-        place = np.array([[cos, sin], [-sin, cos]]) @ (-at[:2] / np.exp(at[3])) / [np.exp(at[4]), 1.0]
+        alone = [_laid(edge[part == p], onto, laid, ALONE)[3] for p in range(PARTS)]
+        cos, sin = np.cos(laid[2]), np.sin(laid[2])
+        place = np.array([[cos, sin], [-sin, cos]]) @ (-laid[:2] / np.exp(laid[3])) / [np.exp(laid[4]), 1.0]
         along = self.along[t]
+        tip = self.tip[t] + place @ [along, [-along[1], along[0]]]
         # What has to grow to be like the reference is farther off.
-        return np.array([*(self.tip[t] + place @ [along, [-along[1], along[0]]]), at[3]])
+        return np.array([*tip, laid[3], *alone])
 
 
 def outlines(rgb: np.ndarray, tool: np.ndarray, camera: Camera) -> list[Outline]:
@@ -156,13 +156,14 @@ def _axis(mask: np.ndarray, tip: np.ndarray, entry: np.ndarray, side: int) -> np
     return along
 
 
-def _laid(edge: np.ndarray, onto: np.ndarray, start: np.ndarray, side: int) -> np.ndarray:
+def _laid(edge: np.ndarray, onto: np.ndarray, start: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """How an outline (N, 4) is laid onto another: shift along and across [px], angle, growth, stretch along it.
 
-    Each place onto the line through the nearest one with a like normal, errors beyond SHARP counting less.
+    Each place onto the line through the nearest one with a like normal, errors beyond SHARP counting less. spread: of
+    the five about where they start.
     """
     tree, at = cKDTree(onto[:, :2]), start.copy()
-    held = 1 / np.square([SLIDE * side, SLIDE * side, TURN, GROW, STRETCH])
+    held = 1 / spread**2
     for turn in range(30):
         cos, sin = np.cos(at[2]), np.sin(at[2])
         stretched = edge[:, :2] * [np.exp(at[4]), 1.0]
@@ -178,7 +179,7 @@ def _laid(edge: np.ndarray, onto: np.ndarray, start: np.ndarray, side: int) -> n
         grow = np.exp(at[3])
         slope = np.stack([line[:, 0], line[:, 1], *(grow * (line * d).sum(1) for d in (aside, turned, longer))], 1)
         square = slope.T @ (weight[:, None] * slope) + np.diag(held)
-        step = np.linalg.solve(square, slope.T @ (weight * rest) + held * at)
+        step = np.linalg.solve(square, slope.T @ (weight * rest) + held * (at - start))
         at = at - step
         if turn > 12 and np.abs(step * [1, 1, 30, 30, 30]).max() < CLOSE:
             break

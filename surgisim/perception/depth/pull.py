@@ -193,21 +193,22 @@ def _carried(
         return unknown
     tool = tools[np.nanargmin(away)]
     way = tool.carried(frames, frames[-1] - len(frames) // 4)
-    seen = np.isfinite(way).all((0, 2))
+    seen = np.isfinite(way).all(1)
     if seen.sum() < FEW:
         return unknown
-    frames, way = frames[seen], way[:, seen]
-    way[..., :2] -= everywhere[frames]
+    frames, way = frames[seen], way[seen]
+    way[:, :2] -= everywhere[frames]
     share = course[frames] - course[frames].mean()
     by_mask = tool.ray(frames) - everywhere[frames]
     size = share @ share
-    ways = np.einsum("f,pfa->pa", share, way) / size
-    # Without its tip an outline does not tell where it ends; where the mask ends is told another way.
-    apart = np.linalg.norm(ways[0, :2] - share @ by_mask / size)
-    spread = np.sqrt((PARTS - 1) * ways[1:, 2].var())
+    whole = share @ way / size
+    # Where an outline ends its tip tells alone, and the mask tells it another way.
+    apart = np.linalg.norm(whole[:2] - share @ by_mask / size)
+    contradict = 1.48 * np.median(np.abs(whole[3:] - np.median(whole[3:]))) / np.sqrt(PARTS)
     each = unknown.each
-    each[frames] = way[0] - way[0].mean(0) + ways[0] * course[frames].mean()
-    return _Carried(ways[0], each, np.array([*[np.hypot(apart, TIP * pixel)] * 2, np.hypot(spread, WIDTH)]))
+    each[frames] = way[:, :3] - way[:, :3].mean(0) + whole[:3] * course[frames].mean()
+    error = np.array([*[np.hypot(apart, TIP * pixel)] * 2, np.hypot(contradict, WIDTH)])
+    return _Carried(whole[:3], each, error)
 
 
 def _everywhere(across: np.ndarray) -> np.ndarray:
