@@ -38,7 +38,6 @@ def test_where_only_a_part_grows_its_stretches_contradict_each_other():
     alike, half = (
         _drawn([*rest, after], wider=(end, (1, 1, 1, 1.2)))[0].carried(np.array([3]), 0)[0, 3:] for end in (150, 30)
     )
-    print(alike, half)
     assert half.std() > 4 * alike.std()
 
 
@@ -54,7 +53,7 @@ def test_a_recording_without_an_instrument_has_no_outline():
 
 
 def _drawn(ways, *, lean=None, wider=None, hidden=None) -> list[Outline]:
-    """Grey on mottled red: tip [px], angle and size of every frame; how much shorter, and how much wider up to where."""
+    """Grey on mottled red: tip [px], angle and size of every frame; how much shorter; up to where how much wider."""
     rng = np.random.default_rng(0)
     mottle = cv2.GaussianBlur(rng.standard_normal((HEIGHT, WIDTH)), (0, 0), 2)
     ground = np.clip(np.array([165, 75, 65]) * (1 + 0.8 * mottle[..., None]), 0, 255)

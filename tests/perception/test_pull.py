@@ -1,6 +1,6 @@
 """Depth's change of pulled tissue, on soft layers whose pull is planted."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,6 +13,12 @@ from surgisim.perception.depth.soft_layer import SoftLayer
 
 COURSE = np.array([0.0, 0.0, 0.3, 0.7, 1.0, 1.0, 0.1])
 """Share of the pull in every frame."""
+SLOPE = np.array([0.1, -0.3])
+CENTER = np.array([0.05, -0.03, 1 + SLOPE @ [0.05, -0.03]])
+_OUT = np.array([*SLOPE, -1.0]) / np.sqrt(1 + SLOPE @ SLOPE)
+_RIGHT = np.array([1.0, 0.0, SLOPE[0]]) / np.hypot(1, SLOPE[0])
+AXES = np.stack([_RIGHT, np.cross(_OUT, _RIGHT), _OUT])
+"""Of the slanted layer: twice along it, and out of it."""
 
 
 @pytest.fixture(scope="module")
@@ -56,11 +62,24 @@ def test_a_planted_pull_is_found_along_the_view(lattice, layer, pull):
     assert np.sqrt(((found - change) ** 2).sum() / (change**2).sum()) < 0.15
 
 
+def test_where_light_tells_little_the_instrument_tells_how_far_tissue_comes_nearer(lattice, layer):
+    pull = np.array([0.09, -0.03, 0.06])
+    rest, watched, change = _pulled(lattice, layer, pull)
+    smoky = replace(watched, light=watched.light + _smoke(watched))
+
+    def off(*tools: _Tip) -> float:
+        return np.sqrt(((nearer(lattice, rest, smoky, tools)[0] - change) ** 2).sum() / (change**2).sum())
+
+    tip, alone = _Tip.of(pull), off()
+    away = replace(tip, way=tip.way + np.array([0.5, 0.0, 0.0]))
+    assert off(tip) < 0.5 * alone
+    assert off(away) == alone, "an instrument elsewhere holds nothing here"
+    assert off(replace(tip, unsure=1.0)) > 1.5 * off(tip), "stretches that contradict each other say little"
+
+
 def test_light_that_changes_where_nothing_moves_counts_for_less(lattice, layer, monkeypatch):
     rest, watched, change = _pulled(lattice, layer, np.array([0.09, -0.03, 0.06]))
-    time = np.arange(len(COURSE))[:, None]
-    smoke = 0.3 * np.sin(9 * watched.ray[0, :, 0] + 6 * watched.ray[0, :, 1] + 0.9 * time)
-    smoky = replace(watched, light=watched.light + smoke)
+    smoky = replace(watched, light=watched.light + _smoke(watched))
 
     def off() -> float:
         return np.sqrt(((nearer(lattice, rest, smoky)[0] - change) ** 2).sum() / (change**2).sum())
@@ -89,19 +108,44 @@ def test_what_goes_farthest_is_the_whole_course_though_more_frames_go_a_little_t
     assert found == pytest.approx(pattern, abs=1e-2)
 
 
+def _smoke(watched: Watched) -> np.ndarray:
+    """Changes of log brightness that drift, (T, K)."""
+    time = np.arange(len(COURSE))[:, None]
+    return 0.3 * np.sin(9 * watched.ray[0, :, 0] + 6 * watched.ray[0, :, 1] + 0.9 * time)
+
+
+@dataclass(frozen=True)
+class _Tip:
+    """Goes as an outline's tip does."""
+
+    way: np.ndarray
+    """X and Y of (X, Y, 1) and the logarithm of its distance, (T, 3)."""
+    unsure: float = 0.0
+    """How far the outline's stretches contradict each other."""
+
+    @classmethod
+    def of(cls, pull: np.ndarray) -> "_Tip":
+        moved = CENTER + COURSE[:, None] * (AXES.T @ pull)
+        return cls(np.concatenate([moved[:, :2] / moved[:, 2:], np.log(moved[:, 2:] / CENTER[2])], 1))
+
+    def ray(self, frames: np.ndarray) -> np.ndarray:
+        return self.way[frames, :2]
+
+    def carried(self, frames: np.ndarray, reference: int) -> np.ndarray:
+        grown = self.way[frames, 2:] - self.way[reference, 2]
+        apart = self.unsure * COURSE[frames, None] * [-1.5, -0.5, 0.5, 1.5]
+        return np.concatenate([self.way[frames, :2], grown, grown + apart], 1)
+
+
 def _pulled(lattice: Lattice, layer: SoftLayer, pull: np.ndarray) -> tuple[np.ndarray, Watched, np.ndarray]:
     """Log depth at rest, what is seen of a slanted layer, and how its log depth changes, (T, h, w).
 
     pull: along the layer twice and out of it, over the distance.
     """
-    slope = np.array([0.1, -0.3])
     ray = np.concatenate([lattice.ray.reshape(-1, 2), np.ones((lattice.pixels[..., 0].size, 1))], -1)
-    tissue = ray / (ray @ [-slope[0], -slope[1], 1.0])[:, None]
-    out = np.array([*slope, -1.0]) / np.sqrt(1 + slope @ slope)
-    right = np.array([1.0, 0.0, slope[0]]) / np.hypot(1, slope[0])
-    axes = np.stack([right, np.cross(out, right), out])
-    at = (tissue - [0.05, -0.03, 1 + slope @ [0.05, -0.03]]) @ axes[:2].T / 0.06
-    unit = axes.T @ layer.carried(at, 2.5)
+    tissue = ray / (ray @ [-SLOPE[0], -SLOPE[1], 1.0])[:, None]
+    at = (tissue - CENTER) @ AXES[:2].T / 0.06
+    unit = AXES.T @ layer.carried(at, 2.5)
     moved = tissue + np.einsum("t,kij,j->tki", COURSE, unit, pull)
     rng = np.random.default_rng(0)
     normals = [_normals(points, lattice.shape) for points in (tissue, *moved)]

@@ -55,7 +55,7 @@ REACHES = 0.2
 """Farthest from the liveliest tissue, once pulled, that the tip of its instrument may be, a share of the distance."""
 TIP, WIDTH = 0.3, 0.01
 """Least errors of where an outline's tip is [px of the lattice], and of the logarithm of how wide it is."""
-FEW = 5
+FEW = 4
 """Frames that tell how an instrument goes."""
 VISIBLE = 0.5
 """Motion across the view below which nothing is said to be pulled [px of the lattice]."""
