@@ -36,7 +36,9 @@ along the shaft over that across it, growth across it (logarithms)."""
 PARTS = 4
 """Stretches of an outline, one behind the other, that are compared with each other."""
 ALONE = np.array([1e-3, 2.0, 1e-5, 0.5, 0.5])
-"""Spreads of the same numbers for a stretch alone, about those of the whole: it may grow, stretch, and lie beside it [px]."""
+"""Spreads of the same for a stretch alone, about what the whole has: it may grow, stretch, and lie beside it [px]."""
+LEAST = 8
+"""Places of a stretch that tell how it grows."""
 CLOSE = 1e-3
 """A step that ends the search [px]; of angles and growths a thirtieth."""
 
@@ -60,8 +62,8 @@ class Outline:
 
     def carried(self, frames: np.ndarray, reference: int) -> np.ndarray:
         """The ray of the reference frame's tip in others, and the logarithm of its distance there, less that in the
-        reference: by the whole outline, and that distance by every stretch of it alone, (F, 3 + PARTS); NaN where none
-        is seen."""
+        reference: by the whole outline, and that distance by every stretch of it alone, (F, 3 + PARTS); NaN where too
+        little is seen."""
         out = np.stack([self._carried(t, reference) for t in frames])
         return np.concatenate([self._ray(out[:, :2]), out[:, 2:]], -1)
 
@@ -76,7 +78,8 @@ class Outline:
         side = max(self.camera.width, self.camera.height)
         laid = _laid(edge, onto, np.zeros(5), np.array([SLIDE * side, SLIDE * side, TURN, GROW, STRETCH]))
         part = np.clip((PARTS * edge[:, 0] / max(edge[:, 0].max(), 1e-9)).astype(int), 0, PARTS - 1)
-        alone = [_laid(edge[part == p], onto, laid, ALONE)[3] for p in range(PARTS)]
+        stretches = [edge[part == p] for p in range(PARTS)]
+        alone = [_laid(s, onto, laid, ALONE)[3] if len(s) >= LEAST else np.nan for s in stretches]
         cos, sin = np.cos(laid[2]), np.sin(laid[2])
         place = np.array([[cos, sin], [-sin, cos]]) @ (-laid[:2] / np.exp(laid[3])) / [np.exp(laid[4]), 1.0]
         along = self.along[t]

@@ -144,7 +144,7 @@ def nearer(
     lively = (around > LIVELY * largest) / np.sqrt(ALIKE)
     full = course > FULL
     liveliest = np.argmax(around)
-    jaws = _carried(tools, course, watched.ray[full][:, liveliest].mean(0), everywhere[:, 0], pixel)
+    jaws = _carried(tools, course, watched.ray[:, liveliest], everywhere[:, 0], pixel)
     scene = _Scene(
         lattice,
         SoftLayer.solved(),
@@ -180,21 +180,22 @@ def nearer(
 def _carried(
     tools: Sequence[Outline], course: np.ndarray, place: np.ndarray, everywhere: np.ndarray, pixel: float
 ) -> _Carried:
-    """How the tip goes of the instrument that is nearest to `place` (2,), where the pulled tissue is in the end.
+    """How the tip goes of the instrument that is nearest to the pulled tissue, which is seen at `place` (T, 2).
 
-    Along the pull, what its way shares with the tissue's course (T,); before it closed and after it let go it is on its
-    own. everywhere: motion of the whole view, (T, 2).
+    What its way shares with the tissue's course (T,) while it is there: before it closes and after it lets go it is on
+    its own. everywhere: motion of the whole view, (T, 2).
     """
     unknown = _Carried(np.full(3, np.nan), np.full((len(course), 3), np.nan), np.ones(3))
     full = np.flatnonzero(course > FULL)
     frames = np.arange(np.flatnonzero(course > BEGUN)[0], full[-1] + 1)
-    away = [np.median(np.linalg.norm(tool.ray(full) - place, axis=-1)) for tool in tools]
+    away = [np.median(np.linalg.norm(tool.ray(full) - place[full], axis=-1)) for tool in tools]
     if not np.nanmin([*away, np.inf]) < REACHES:
         return unknown
     tool = tools[np.nanargmin(away)]
-    way = tool.carried(frames, frames[-1] - len(frames) // 4)
-    seen = np.isfinite(way).all(1)
-    if seen.sum() < FEW:
+    frames = frames[np.linalg.norm(tool.ray(frames) - place[frames], axis=-1) < REACHES]
+    way = tool.carried(frames, full[len(full) // 2])
+    seen = np.isfinite(way[:, :3]).all(1)
+    if seen.sum() < FEW or np.ptp(course[frames[seen]]) < BEGUN or np.isfinite(way[seen, 3:]).all(0).sum() < 2:
         return unknown
     frames, way = frames[seen], way[seen]
     way[:, :2] -= everywhere[frames]
@@ -204,7 +205,7 @@ def _carried(
     whole = share @ way / size
     # Where an outline ends its tip tells alone, and the mask tells it another way.
     apart = np.linalg.norm(whole[:2] - share @ by_mask / size)
-    contradict = 1.48 * np.median(np.abs(whole[3:] - np.median(whole[3:]))) / np.sqrt(PARTS)
+    contradict = 1.48 * np.nanmedian(np.abs(whole[3:] - np.nanmedian(whole[3:]))) / np.sqrt(PARTS)
     each = unknown.each
     each[frames] = way[:, :3] - way[:, :3].mean(0) + whole[:3] * course[frames].mean()
     error = np.array([*[np.hypot(apart, TIP * pixel)] * 2, np.hypot(contradict, WIDTH)])
