@@ -14,13 +14,13 @@ T = 30
 WAY = course(T, 5, 25, (24, 6))
 
 
-def carried(xy, seen, jaws) -> np.ndarray:
+def carried(xy, seen, jaws, tip=None) -> np.ndarray:
     """Where a grip at (70, 50) is taken [px], (T, 2)."""
     flat = np.full((T, H, W), 0.1, np.float32)
     grip = Grip(np.array([70.0, 50.0]), 6.0, 3, T - 1, 1.0)
     paths = Paths(xy.astype(np.float32), seen, np.full(seen.shape, 0.1, np.float32))
     cam = camera(W, H, T)
-    motion = carry([grip], paths, [jaws], Depth(flat, np.ones_like(flat), "known"), cam, "found")
+    motion = carry([grip], paths, [jaws], [tip], Depth(flat, np.ones_like(flat), "known"), cam, "found")
     return cam.project(motion.position[0]) - (70, 50)
 
 
@@ -55,6 +55,21 @@ def test_the_course_of_a_way_is_that_of_the_tissue_around():
     assert np.sqrt(((share - truth) ** 2).mean()) < 0.02
 
 
+def test_tissue_that_lags_behind_its_jaws_leaves_the_way_to_their_tip():
+    _, _, xy, seen = pulled([Pull((127, 40), (70, 50), WAY, np.ones(T, bool))])
+    lagging = (xy[:, :1] + 0.8 * (xy - xy[:, :1])).astype(float)
+    rng = np.random.default_rng(0)
+    tip = WAY + (68, 47) + rng.normal(0, 0.2, (T, 2))
+    tip[:5] += np.arange(5, 0, -1)[:, None] * (4, 2)
+
+    def off(tip) -> float:
+        return np.linalg.norm((carried(lagging, np.ones_like(seen), None, tip) - WAY)[3:], axis=-1).max()
+
+    assert off(tip) < 0.7 < 3 < off(None), "a tip that is on its own until it closes"
+    assert off((68, 47) - 0.5 * WAY[:, ::-1]) == off(None), "a tip that goes elsewhere"
+    assert off(np.full((T, 2), np.nan)) == off(None), "a tip that is not seen"
+
+
 def beside_an_edge(source: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of a grip at (70, 50) on a lobe at .06 m, whose jaws close on what lies behind it at .1 m and lift that by .02 m
     straight to the camera: its place at rest [px] and depth [m], and how its depth changes [m], (T,)."""
@@ -66,7 +81,7 @@ def beside_an_edge(source: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     still = np.stack(np.meshgrid(np.arange(4.0, W, 6), np.arange(4.0, H, 6)), -1).reshape(-1, 1, 2).repeat(T, 1)
     paths = Paths(still.astype(np.float32), np.ones(still.shape[:2], bool), np.full(still.shape[:2], 0.1, np.float32))
     cam, grip = camera(W, H, T), Grip(np.array([70.0, 50.0]), 8.0, 3, T - 1, 1.0)
-    motion = carry([grip], paths, [None], Depth(z, np.ones_like(z), "known"), cam, source)
+    motion = carry([grip], paths, [None], [None], Depth(z, np.ones_like(z), "known"), cam, source)
     return (
         cam.project(motion.center_rest)[0],
         motion.center_rest[0, 2],

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from pulled_sheet import camera
 
-from surgisim.perception.depth.outline import Outline, outlines
+from surgisim.perception.grasp.instruments import instruments
+from surgisim.perception.grasp.outline import Outline, outlines
 
 WIDTH, HEIGHT, FINE = 160, 128, 8
 SHAFT = np.array([[0, 2.5], [12, 5.5], [14, 4.5], [24, 4.5], [26, 7.0], [140, 7.0]])
@@ -47,11 +48,6 @@ def test_frames_without_an_instrument_tell_nothing():
     assert told.tolist() == [True, True, False, True, True]
 
 
-def test_a_recording_without_an_instrument_has_no_outline():
-    rgb = np.full((3, HEIGHT, WIDTH, 3), 120, np.uint8)
-    assert outlines(rgb, np.zeros(rgb.shape[:3], bool), camera(WIDTH, HEIGHT, 3)) == []
-
-
 def _drawn(ways, *, lean=None, wider=None, hidden=None) -> list[Outline]:
     """Grey on mottled red: tip [px], angle and size of every frame; how much shorter; up to where how much wider."""
     rng = np.random.default_rng(0)
@@ -64,7 +60,9 @@ def _drawn(ways, *, lean=None, wider=None, hidden=None) -> list[Outline]:
         picture = share[..., None] * np.array([150, 152, 155]) + (1 - share[..., None]) * ground
         rgb.append(np.rint(picture + rng.normal(0, 2, picture.shape)).clip(0, 255).astype(np.uint8))
         tool.append(share > 0.5)
-    return outlines(np.stack(rgb), np.stack(tool), camera(WIDTH, HEIGHT, len(ways)))
+    tool = np.stack(tool)
+    found = instruments(tool, np.ones((HEIGHT, WIDTH), bool), np.zeros((len(tool) - 1, HEIGHT, WIDTH, 2)))
+    return outlines(np.stack(rgb), found, camera(WIDTH, HEIGHT, len(ways)))
 
 
 def _share(tip, angle, size, lean, wider) -> np.ndarray:

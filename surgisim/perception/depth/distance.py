@@ -12,7 +12,10 @@ from surgisim.artifacts.inpainted import SEEN, Inpainted
 from surgisim.artifacts.masks import Masks
 from surgisim.config import depth as config
 from surgisim.perception.depth import depth_anything, given, near_light, stereo
-from surgisim.perception.depth.outline import outlines
+from surgisim.perception.grasp.contact import frame_flow
+from surgisim.perception.grasp.instruments import Instrument, instruments
+from surgisim.perception.grasp.outline import outlines
+from surgisim.perception.masking.appearance import lit
 from surgisim.problem import Problem
 
 FLAT = 0.1
@@ -56,13 +59,17 @@ def depth(
             distance=settings.distance,
             relief=settings.relief,
             size=settings.lattice,
-            tools=outlines(frames.rgb, masks.tool, camera),
+            tools=outlines(frames.rgb, _tools(frames.rgb, masks.tool), camera),
             progress=progress,
         )
         scale = "arbitrary"
     follows = name != "near_light"
     confidence = np.where(inpainted.origin == SEEN, confidence, np.minimum(confidence, FLAT))
     return Depth(z.astype(np.float32), confidence.astype(np.float32), scale, follows)
+
+
+def _tools(rgb: np.ndarray, tool: np.ndarray) -> list[Instrument]:
+    return instruments(tool, lit(rgb)[0], frame_flow(rgb)) if tool.any() and len(rgb) > 1 else []
 
 
 def choose(wanted: str, given_: Given) -> str:

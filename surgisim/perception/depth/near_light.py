@@ -21,9 +21,9 @@ import numpy as np
 from surgisim.artifacts.camera import Camera
 from surgisim.lighting.headlight import linear_light
 from surgisim.lighting.veil import ABOVE, veil_of
-from surgisim.perception.depth.outline import Outline
 from surgisim.perception.depth.pull import Watched, nearer
 from surgisim.perception.depth.shading import Lattice, explain, shading
+from surgisim.perception.grasp.outline import Outline
 from surgisim.perception.tracking.spread import spread
 from surgisim.perception.tracking.warp import Warp, follow_surface
 

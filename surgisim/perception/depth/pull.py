@@ -3,8 +3,9 @@
 Tissue that jaws carry off takes its surroundings along as a soft layer does (soft_layer.py): place and size of the held
 ball, the layer's thickness and the pull decide the motion of the whole surface, along the view too. These few numbers
 are fitted to the motion seen across the view, which tells most of them, to the change of brightness, which tells
-best how far the surface turns and comes nearer, and to how the instrument goes that holds the ball (outline.py). First
-to the pattern that most of the recording's motion shares; then, with place and size kept, to every frame.
+best how far the surface turns and comes nearer, and to the way of the instrument that holds the ball
+(grasp/outline.py). First to the pattern that most of the recording's motion shares; then, with place and size kept, to
+every frame.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,9 +15,9 @@ import cv2
 import numpy as np
 
 from surgisim.lighting.headlight import MATTE
-from surgisim.perception.depth.outline import PARTS, Outline
 from surgisim.perception.depth.shading import Lattice
 from surgisim.perception.depth.soft_layer import SoftLayer
+from surgisim.perception.grasp.outline import PARTS, Outline
 
 RADIUS, RADIUS_SPREAD = 0.06, 0.2
 """Expected radius of a held ball, as a share of the distance; spread of its logarithm."""

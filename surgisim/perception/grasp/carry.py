@@ -23,6 +23,9 @@ EDGE, ALIKE, DISC = 0.1, 0.03, 0.6
 """Where depth's change is measured: how much nearer or farther than the jaws as they close the depth at a grip's place
 is, as a share, if that lies beside an edge of depth; how near to theirs the depth of what they hold is, as a share; and
 radii of a grip within which depth is theirs."""
+STRAYS, SEEN = 0.003, 0.5
+"""Error of a tip's place from which a frame counts less, as a share of the longer image side; least share of the frames
+that show it, and of those in which it goes as the tissue does, within twice that error."""
 COURSES, ELSE = 2, 0.2
 """Courses in time of which all tissue around a pull has its share: with two, a way's course is .3 % off (root mean
 square, as a share of its length; 38 and 40 clips of families 27182 and 16180) where the ring alone has it 1.0 and .7 %
@@ -30,23 +33,30 @@ off. Share of the way that may be none of them: beyond, the ring has the word.""
 
 
 def carry(
-    grips: list[Grip], paths: Paths, jaws: list[np.ndarray | None], depth: Depth, camera: Camera, source: str
+    grips: list[Grip],
+    paths: Paths,
+    jaws: list[np.ndarray | None],
+    tips: list[np.ndarray | None],
+    depth: Depth,
+    camera: Camera,
+    source: str,
 ) -> Motion:
     """The grips as balls in the camera frame [m] and their ways.
 
     paths: tissue points about each grip, hidden ones too. jaws: the motion of each grip's jaws to the next frame [px],
-    (T, 2), none if they are not known. The ball is carried by the ring of tissue around the jaws that moves as one with
-    it; where that is hidden, or is seen to go elsewhere than the jaws, by the jaws.
+    (T, 2), tips: where their tips are by the instruments' outlines [px], (T, 2), none if they are not known. The ball
+    is carried by its tip, where that goes as the tissue around it does in time; else by the ring of tissue around the
+    jaws that moves as one with it, and where that is hidden, or is seen to go elsewhere than the jaws, by the jaws.
     """
     frames = paths.xy.shape[1]
     z = _depth_at(depth, paths.xy)
     center, radius, position, active = [], [], [], []
-    for grip, step in zip(grips, jaws, strict=True):
+    for grip, step, tip in zip(grips, jaws, tips, strict=True):
         middle, rest_z, theirs = _rest(grip, paths, depth, marked=source == "given")
         grip = replace(grip, center=middle)
         held = np.linalg.norm(paths.xy[:, 0] - grip.center, axis=-1)
         ring = held <= max(grip.radius, np.sort(held)[min(8, len(held) - 1)])
-        place, deep = _course(paths, z, ring, step, grip, max(camera.width, camera.height))
+        place, deep = _course(paths, z, ring, step, tip, grip, max(camera.width, camera.height))
         if theirs is not None:
             deep = _at_jaws(depth, grip.center + place, grip, theirs)
         way = camera.lift(grip.center + place, rest_z + deep)
@@ -123,7 +133,13 @@ def _depth_at(depth: Depth, xy: np.ndarray) -> np.ndarray:
 
 
 def _course(
-    paths: Paths, z: np.ndarray, ring: np.ndarray, jaws: np.ndarray | None, grip: Grip, side: int
+    paths: Paths,
+    z: np.ndarray,
+    ring: np.ndarray,
+    jaws: np.ndarray | None,
+    tip: np.ndarray | None,
+    grip: Grip,
+    side: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement across [px], (T, 2), and along the view [m], (T,), of the held ball, smoothed in time."""
     moved = (paths.xy[ring] - paths.xy[ring, :1]).astype(float)
@@ -138,7 +154,7 @@ def _course(
         along[t] = np.percentile(deep[who, t], 20 if np.median(deep[who, t]) < 0 else 80)
     if jaws is not None:
         across = _with_jaws(across, seen.sum(0) >= SHOWN, jaws, grip, side)
-    across = _as_around(across, paths, grip)
+    across = _as_around(across, tip, paths, grip, side)
     stretch = slice(grip.begin, grip.end + 1)
     across[stretch] = gaussian_filter1d(across[stretch], 0.7, axis=0, mode="nearest")
     along[stretch] = gaussian_filter1d(along[stretch], 1.5, axis=0, mode="nearest")
@@ -148,11 +164,12 @@ def _course(
     return across, along
 
 
-def _as_around(across: np.ndarray, paths: Paths, grip: Grip) -> np.ndarray:
-    """`across` (T, 2) with the course in time that the tissue around the grip has while it holds.
+def _as_around(across: np.ndarray, tip: np.ndarray | None, paths: Paths, grip: Grip, side: int) -> np.ndarray:
+    """`across` (T, 2), or the way of the `tip` (T, 2) [px], with the course in time that the tissue around the grip has
+    while it holds.
 
-    A ring is a few points, some of which jaws hide now and then; what it carries along is hundreds, each of which goes
-    some share of its way.
+    A ring is a few points, some of which jaws hide now and then, and lags behind them; what it carries along is
+    hundreds, each of which goes some share of its way. A tip is on its own until it holds.
     """
     frames = np.arange(grip.begin, grip.end + 1)
     away = np.linalg.norm(paths.xy[:, 0] - grip.center, axis=-1)
@@ -168,11 +185,33 @@ def _as_around(across: np.ndarray, paths: Paths, grip: Grip) -> np.ndarray:
     courses = courses - courses[0]
     found = across[frames] - across[grip.begin]
     fitted = courses @ np.linalg.lstsq(courses, found, rcond=None)[0]
-    if np.linalg.norm(found - fitted) > ELSE * np.linalg.norm(found):
+    by_tip = None if tip is None else _by_tip(tip[frames], courses, STRAYS * side)
+    if by_tip is not None and np.linalg.norm(found - by_tip) < ASTRAY * np.linalg.norm(by_tip):
+        fitted = by_tip
+    elif np.linalg.norm(found - fitted) > ELSE * np.linalg.norm(found):
         return across
     out = across.copy()
     out[frames] = across[grip.begin] + fitted
     return out
+
+
+def _by_tip(tip: np.ndarray, courses: np.ndarray, strays: float) -> np.ndarray | None:
+    """The share of a tip's places (F, 2) [px], NaN where unknown, that follows the courses (F, C) from 0, (F, 2).
+
+    None if it is seen in too few frames, or if less than half of those go so.
+    """
+    known = np.isfinite(tip).all(1)
+    if known.mean() < SEEN:
+        return None
+    basis = np.column_stack([np.ones(len(courses)), courses])
+    weight = known.astype(float)
+    for _ in range(20):
+        heavy = np.sqrt(weight[known])[:, None]
+        gone = np.linalg.lstsq(heavy * basis[known], heavy * tip[known], rcond=None)[0]
+        off = np.linalg.norm(np.where(known[:, None], tip, 0.0) - basis @ gone, axis=1)
+        weight = known / (1 + (off / strays) ** 2)
+    way = courses @ gone[1:]
+    return way if (off[known] < 2 * strays).mean() > SEEN else None
 
 
 def _with_jaws(across: np.ndarray, shown: np.ndarray, jaws: np.ndarray, grip: Grip, side: int) -> np.ndarray:

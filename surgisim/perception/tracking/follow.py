@@ -19,7 +19,8 @@ from surgisim.perception.grasp.contact import frame_flow
 from surgisim.perception.grasp.find import LIKELY, Grip, find
 from surgisim.perception.grasp.following import jaw_motion
 from surgisim.perception.grasp.given import given
-from surgisim.perception.grasp.instruments import instruments, nearest
+from surgisim.perception.grasp.instruments import Instrument, instruments, nearest
+from surgisim.perception.grasp.outline import outlines
 from surgisim.perception.grasp.say import advice, whose
 from surgisim.perception.masking.appearance import lit
 from surgisim.perception.tracking import Paths
@@ -65,13 +66,22 @@ def follow(
         grips = sorted((g for g in seen if g.confidence >= LIKELY), key=lambda g: g.begin)
     holders = [g.instrument if g.instrument >= 0 else nearest(tools, g.center, g.begin) for g in grips]
     jaws = [jaw_motion(flow, tools[h], side) if h is not None else None for h in holders]
-    motion = carry(grips, paths, jaws, depth, camera, source)
+    tips = [_tip(rgb, tools[h], camera, g) if h is not None else None for h, g in zip(holders, grips, strict=True)]
+    motion = carry(grips, paths, jaws, tips, depth, camera, source)
     _say(motion, camera, settings, [whose(tools, grip) for grip in grips], advice(seen, tools, camera))
     keep = _choose(queries, usable, grips, settings)
     if not keep.any():
         raise Problem("tracking: the tissue of frame 0 is too small to follow a point on. Check masks.npz.")
     chosen = Paths(paths.xy[keep], paths.visible[keep], paths.sigma[keep])
     return lift(chosen, depth, camera), motion
+
+
+def _tip(rgb: np.ndarray, tool: Instrument, camera: Camera, grip: Grip) -> np.ndarray:
+    """Where the tip of a grip's instrument is while it holds, by its outline [px], NaN elsewhere, (T, 2)."""
+    (outline,) = outlines(rgb, [tool], camera)
+    out, frames = np.full((len(rgb), 2), np.nan), np.arange(grip.begin, grip.end + 1)
+    out[frames] = outline.carried(frames, int(frames[len(frames) // 2]))[:, :2]
+    return out * [camera.fx, camera.fy] + [camera.cx, camera.cy]
 
 
 def _backend(name: str):

@@ -7,7 +7,6 @@ jaws that open grow in one place and not in another: then the stretches of the o
 unsure is the answer.
 """
 
-import itertools
 from dataclasses import dataclass
 
 import cv2
@@ -15,9 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from surgisim.artifacts.camera import Camera
-from surgisim.perception.flow import dense_flow
-from surgisim.perception.grasp.instruments import Instrument, instruments
-from surgisim.perception.masking.appearance import lit
+from surgisim.perception.grasp.instruments import Instrument
 from surgisim.perception.tracking.between import sample
 
 REACH = 0.4
@@ -88,12 +85,9 @@ class Outline:
         return np.array([*tip, laid[3], *alone])
 
 
-def outlines(rgb: np.ndarray, tool: np.ndarray, camera: Camera) -> list[Outline]:
-    """Of every instrument. rgb: sRGB, (T, H, W, 3) uint8. tool: every instrument's pixels, (T, H, W) bool."""
-    if not tool.any() or len(rgb) < 2:
-        return []
-    flow = np.stack([dense_flow(a, b) for a, b in itertools.pairwise(rgb)])
-    return [_outline(found, rgb, camera) for found in instruments(tool, lit(rgb)[0], flow)]
+def outlines(rgb: np.ndarray, tools: list[Instrument], camera: Camera) -> list[Outline]:
+    """Of every instrument. rgb: sRGB, (T, H, W, 3) uint8."""
+    return [_outline(found, rgb, camera) for found in tools]
 
 
 def _outline(found: Instrument, rgb: np.ndarray, camera: Camera) -> Outline:
