@@ -59,14 +59,14 @@ def test_tissue_that_lags_behind_its_jaws_leaves_the_way_to_their_tip():
     _, _, xy, seen = pulled([Pull((127, 40), (70, 50), WAY, np.ones(T, bool))])
     lagging = (xy[:, :1] + 0.8 * (xy - xy[:, :1])).astype(float)
     rng = np.random.default_rng(0)
-    tip = WAY + (68, 47) + rng.normal(0, 0.2, (T, 2))
+    tip = WAY + np.array([68, 47]) + rng.normal(0, 0.2, (T, 2))
     tip[:5] += np.arange(5, 0, -1)[:, None] * (4, 2)
 
     def off(tip) -> float:
         return np.linalg.norm((carried(lagging, np.ones_like(seen), None, tip) - WAY)[3:], axis=-1).max()
 
     assert off(tip) < 0.7 < 3 < off(None), "a tip that is on its own until it closes"
-    assert off((68, 47) - 0.5 * WAY[:, ::-1]) == off(None), "a tip that goes elsewhere"
+    assert off(np.array([68, 47]) - 0.5 * WAY[:, ::-1]) == off(None), "a tip that goes elsewhere"
     assert off(np.full((T, 2), np.nan)) == off(None), "a tip that is not seen"
 
 
