@@ -23,6 +23,8 @@ EDGE, ALIKE, DISC = 0.1, 0.03, 0.6
 """Where depth's change is measured: how much nearer or farther than the jaws as they close the depth at a grip's place
 is, as a share, if that lies beside an edge of depth; how near to theirs the depth of what they hold is, as a share; and
 radii of a grip within which depth is theirs."""
+LAGS = 0.6
+"""How far behind its tip, as a share of the way, tissue around jaws may stay that is carried by them."""
 STRAYS, SEEN = 0.003, 0.5
 """Error of a tip's place from which a frame counts less, as a share of the longer image side; least share of the frames
 that show it, and of those in which it goes as the tissue does, within twice that error."""
@@ -186,7 +188,7 @@ def _as_around(across: np.ndarray, tip: np.ndarray | None, paths: Paths, grip: G
     found = across[frames] - across[grip.begin]
     fitted = courses @ np.linalg.lstsq(courses, found, rcond=None)[0]
     by_tip = None if tip is None else _by_tip(tip[frames], courses, STRAYS * side)
-    if by_tip is not None and np.linalg.norm(found - by_tip) < ASTRAY * np.linalg.norm(by_tip):
+    if by_tip is not None and np.linalg.norm(found - by_tip) < LAGS * np.linalg.norm(by_tip):
         fitted = by_tip
     elif np.linalg.norm(found - fitted) > ELSE * np.linalg.norm(found):
         return across
