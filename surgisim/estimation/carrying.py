@@ -15,10 +15,10 @@ from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.tracks import Tracks
 from surgisim.estimation.unknown import RELAID, Unknown
 
-TOWARD, TOWARD_READ, TOWARD_MEASURED = 0.08, 0.02, 0.01
+TOWARD, TOWARD_READ, TOWARD_MEASURED = 0.08, 0.025, 0.01
 """Spread of how far a grip comes nearer, as a share of its distance: a pull of some 5 to 10 mm at 50 to 100 mm; what is
-left open of it where depth's change was read off brightness, motion and the instrument (on 25 clips of family 261126 it
-is .012 off, root mean square, and .007 on average), and where it was measured in every frame."""
+left open of it where depth's change was read off brightness, motion and the instrument (on 25 and 24 clips of families
+261126 and 281127 it is .012 and .024 off, root mean square, one clip .09), and where it was measured in every frame."""
 LEVEL = 1e-4
 """Share of its distance below which a found path does not come nearer: nothing was read off."""
 BESIDE = 0.5
