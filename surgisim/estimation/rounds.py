@@ -31,6 +31,10 @@ INDEPENDENT = 0.02
 """Share of residuals counted as independent: neighbouring points and frames share their tracking error."""
 RATIOS = (0.40, 0.47)
 """Poisson's ratios at which supports are compared: both shape the spread of a load, so neither is judged alone."""
+RIVALS = 1.1
+"""Times the cost of the best up to which a start in another valley, or a descent from it, may yet end lower."""
+TRIED = 2
+"""Steps that a descent in another valley may take before it must have kept up."""
 NEARER = (0.0, -1.0, 1.0)
 """How much farther off than expected the grip ends there, in spreads of its prior."""
 INERTIA = 0.005
@@ -294,12 +298,13 @@ def settle_pull(
 
 def descend(
     trial: Trial, x: np.ndarray, ends: list[int], settings: Estimation, history: list, say: Say,
-    jacobian: np.ndarray | None = None,
+    jacobian: np.ndarray | None = None, lead: list | None = None,
 ) -> tuple[Trial, Solution]:  # fmt: skip
     """Gauss-Newton from x over windows that end at these frames, the last at the last fitted one.
 
     What cannot be borne gives way from there on. jacobian: a derivative, (R, M), that is nearly right there already,
-    where there is but one window.
+    where there is but one window. lead: history of a descent from elsewhere. Raises Outrun where this one has fallen
+    behind it.
     """
     wanted = trial.wanted
     for k, last in enumerate(ends):
@@ -313,6 +318,8 @@ def descend(
                 x = now
                 values = {n: float(f"{v:.4g}") for n, v in plain(wanted, x).items()}
                 history.append({"round": k, "last_frame": int(last), "iteration": iteration, "cost": cost} | values)
+                if lead and outrun(history[-1], lead):
+                    raise Outrun
                 done = 0.25 + 0.3 * (k + iteration / settings.iterations) / len(ends)
                 say(done, 1.0, f"round {k + 1}/{len(ends)}, iteration {iteration}: {values}")
 
@@ -337,14 +344,25 @@ def descend(
     return trial, solution
 
 
+class Outrun(Exception):
+    """A descent has fallen behind another."""
+
+
+def outrun(row: dict, lead: list[dict]) -> bool:
+    """Whether a row of a descent's history costs RIVALS times what another had come to in that round by then."""
+    there = [r["cost"] for r in lead if r["round"] == row["round"] and r["iteration"] <= row["iteration"]]
+    return row["iteration"] >= TRIED and bool(there) and row["cost"] > RIVALS * there[-1]
+
+
 def lowest(
     trial: Trial, starts: list[np.ndarray], ends: list[int], settings: Estimation, history: list, say: Say
 ) -> tuple[Trial, Solution]:
-    """Of one descent from every start the one that ends lowest; the others' rounds are written down as rivals'.
+    """Of one descent from every start the one that ends lowest; the others' rounds are written down as rivals', who are
+    given up where they fall behind.
 
     Raises Breakdown where none of them can be borne.
     """
-    runs, broken = [], None
+    runs, behind, broken = [], [], None
     for n, x in enumerate(starts):
         rows: list = []
 
@@ -352,10 +370,14 @@ def lowest(
             # A descent tells of 0.25 to 0.55 of an estimation, which all of them share.
             say(0.25 + (0.3 * n + done - 0.25) / len(starts), whole, text if n == 0 else f"another valley, {text}")
 
+        lead = min(runs, key=lambda run: run[0])[1] if runs else None
         try:
-            there, solution = descend(trial, x, ends, settings, rows, said)
+            there, solution = descend(trial, x, ends, settings, rows, said, lead=lead)
         except Breakdown as breakdown:
             broken = breakdown
+            continue
+        except Outrun:
+            behind += rows
             continue
         runs.append((cost_of(solution.residual, solution.x, trial.wanted), rows, there, solution))
     if not runs:
@@ -363,6 +385,7 @@ def lowest(
     best = min(runs, key=lambda run: run[0])
     for run in runs:
         history += run[1] if run is best else [row | {"round": "rival"} for row in run[1]]
+    history += [row | {"round": "rival"} for row in behind]
     return best[2:]
 
 

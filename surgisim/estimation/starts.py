@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surgisim.artifacts.motion import Motion
-from surgisim.estimation.rounds import cost_of, number, plain
+from surgisim.estimation.rounds import RIVALS, cost_of, number, plain
 from surgisim.estimation.search import Search
 from surgisim.estimation.trial import Trial, at_once
 from surgisim.mpm.grip import runs
@@ -34,8 +34,6 @@ SIMULATED = 5
 """How many of the likeliest starts are simulated."""
 APART = 0.35
 """Logarithm of how many times stiffer a start is from which it lies in another valley: a fifth faster, or more."""
-RIVALS = 1.1
-"""Times the cost of the best start up to which that of another valley may yet end lower."""
 FOLLOWED = 2
 """How many other valleys are followed at most."""
 

@@ -70,7 +70,7 @@ def test_of_every_valley_one_start_comes_before_seconds_of_any():
 def ends(costs: dict[float, float | None]):
     """A descent that ends at these costs for starts of these stiffnesses, None where it breaks."""
 
-    def descend(trial, x, ends, settings, rows, say):
+    def descend(trial, x, ends, settings, rows, say, lead):
         cost = costs[float(x[0])]
         if cost is None:
             raise Breakdown("broken")
@@ -90,6 +90,16 @@ def test_the_valley_that_ends_lowest_is_taken_and_the_others_are_told_as_rivals(
     assert solution.x is starts[lowest]
     assert [h["cost"] for h in history if h["round"] == 0] == [costs[lowest]]
     assert len(history) == sum(c is not None for c in costs)
+
+
+def test_a_valley_is_given_up_that_falls_behind_after_two_steps():
+    lead = [{"round": 0, "iteration": i, "cost": c} for i, c in enumerate((1000.0, 500.0, 300.0, 290.0))]
+    row = {"round": 0, "iteration": 2, "cost": 320.0}
+    assert not rounds.outrun(row, lead)
+    assert rounds.outrun(row | {"cost": 340.0}, lead)
+    assert not rounds.outrun({"round": 0, "iteration": 1, "cost": 900.0}, lead), "too early to tell"
+    assert rounds.outrun({"round": 0, "iteration": 9, "cost": 330.0}, lead), "against where the other ended"
+    assert not rounds.outrun(row | {"round": 1, "cost": 900.0}, lead), "in a round that the other has not come to"
 
 
 def test_where_every_start_breaks_it_is_said(monkeypatch):
