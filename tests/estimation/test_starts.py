@@ -102,6 +102,21 @@ def test_a_valley_is_given_up_that_falls_behind_after_two_steps():
     assert not rounds.outrun(row | {"round": 1, "cost": 900.0}, lead), "in a round that the other has not come to"
 
 
+def test_what_a_given_up_descent_came_to_is_told_as_a_rivals(monkeypatch):
+    def descend(trial, x, ends, settings, rows, say, lead):
+        rows.append({"round": 0, "cost": float(x[0])})
+        if lead:
+            raise rounds.Outrun
+        return trial, SimpleNamespace(x=x, residual=float(x[0]))
+
+    monkeypatch.setattr(rounds, "descend", descend)
+    monkeypatch.setattr(rounds, "cost_of", lambda r, x, wanted: r)
+    history, starts = [], [np.array([4.0]), np.array([3.0])]
+    _, solution = rounds.lowest(SimpleNamespace(wanted=None), starts, [5], None, history, None)
+    assert solution.x is starts[0]
+    assert history == [{"round": 0, "cost": 4.0}, {"round": "rival", "cost": 3.0}]
+
+
 def test_where_every_start_breaks_it_is_said(monkeypatch):
     monkeypatch.setattr(rounds, "descend", ends({0.0: None}))
     with pytest.raises(Breakdown):
