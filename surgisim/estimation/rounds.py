@@ -6,7 +6,7 @@ window is twice the last, so all rounds together cost at most twice the last one
 
 import itertools
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -33,8 +33,6 @@ RATIOS = (0.40, 0.47)
 """Poisson's ratios at which supports are compared: both shape the spread of a load, so neither is judged alone."""
 RIVALS = 1.1
 """Times the cost of the best up to which a start in another valley, or a descent from it, may yet end lower."""
-TRIED = 2
-"""Steps that a descent in another valley may take before it must have kept up."""
 NEARER = (0.0, -1.0, 1.0)
 """How much farther off than expected the grip ends there, in spreads of its prior."""
 INERTIA = 0.005
@@ -298,13 +296,12 @@ def settle_pull(
 
 def descend(
     trial: Trial, x: np.ndarray, ends: list[int], settings: Estimation, history: list, say: Say,
-    jacobian: np.ndarray | None = None, lead: list | None = None,
+    jacobian: np.ndarray | None = None, renewed: bool = True,
 ) -> tuple[Trial, Solution]:  # fmt: skip
     """Gauss-Newton from x over windows that end at these frames, the last at the last fitted one.
 
     What cannot be borne gives way from there on. jacobian: a derivative, (R, M), that is nearly right there already,
-    where there is but one window. lead: history of a descent from elsewhere. Raises Outrun where this one has fallen
-    behind it.
+    where there is but one window. renewed: whether the derivative that is returned must have been taken at the end.
     """
     wanted = trial.wanted
     for k, last in enumerate(ends):
@@ -318,8 +315,6 @@ def descend(
                 x = now
                 values = {n: float(f"{v:.4g}") for n, v in plain(wanted, x).items()}
                 history.append({"round": k, "last_frame": int(last), "iteration": iteration, "cost": cost} | values)
-                if lead and outrun(history[-1], lead):
-                    raise Outrun
                 done = 0.25 + 0.3 * (k + iteration / settings.iterations) / len(ends)
                 say(done, 1.0, f"round {k + 1}/{len(ends)}, iteration {iteration}: {values}")
 
@@ -337,6 +332,7 @@ def descend(
                     said=said,
                     together=partial(trial.together, last=last),
                     jacobian=jacobian,
+                    renewed=renewed,
                 )
             except Breakdown as breakdown:
                 trial = softer(trial, x, history, breakdown)
@@ -344,49 +340,60 @@ def descend(
     return trial, solution
 
 
-class Outrun(Exception):
-    """A descent has fallen behind another."""
+@dataclass(frozen=True)
+class _Run:
+    """A descent from one start."""
 
-
-def outrun(row: dict, lead: list[dict]) -> bool:
-    """Whether a row of a descent's history costs RIVALS times what another had come to in that round by then."""
-    there = [r["cost"] for r in lead if r["round"] == row["round"] and r["iteration"] <= row["iteration"]]
-    return row["iteration"] >= TRIED and bool(there) and row["cost"] > RIVALS * there[-1]
+    cost: float
+    rows: list
+    """Its history."""
+    trial: Trial
+    solution: Solution
 
 
 def lowest(
     trial: Trial, starts: list[np.ndarray], ends: list[int], settings: Estimation, history: list, say: Say
 ) -> tuple[Trial, Solution]:
-    """Of one descent from every start the one that ends lowest; the others' rounds are written down as rivals', who are
-    given up where they fall behind.
+    """Of the descents from every start the one that ends lowest; the others' rounds are written down as rivals'.
 
-    Raises Breakdown where none of them can be borne.
+    Starts of several valleys go a step each first, and those on that then cost at most RIVALS times what the best does:
+    a start is as far from its valley's floor as moduli were tried apart, which may hide which floor is lower. Raises
+    Breakdown where none of them can be borne.
     """
-    runs, behind, broken = [], [], None
-    for n, x in enumerate(starts):
-        rows: list = []
+    runs, broken = [], None
 
-        def said(done: float, whole: float, text: str, n=n) -> None:
+    def started(begin: Trial, x: np.ndarray, rows: list, ends: list[int], settings: Estimation, n: int, **more) -> None:
+        nonlocal broken
+
+        def said(done: float, whole: float, text: str) -> None:
             # A descent tells of 0.25 to 0.55 of an estimation, which all of them share.
             say(0.25 + (0.3 * n + done - 0.25) / len(starts), whole, text if n == 0 else f"another valley, {text}")
 
-        lead = min(runs, key=lambda run: run[0])[1] if runs else None
         try:
-            there, solution = descend(trial, x, ends, settings, rows, said, lead=lead)
+            there, solution = descend(begin, x, ends, settings, rows, said, **more)
         except Breakdown as breakdown:
             broken = breakdown
-            continue
-        except Outrun:
-            behind += rows
-            continue
-        runs.append((cost_of(solution.residual, solution.x, trial.wanted), rows, there, solution))
+            return
+        runs.append(_Run(cost_of(solution.residual, solution.x, trial.wanted), rows, there, solution))
+
+    if len(starts) == 1:
+        started(trial, starts[0], [], ends, settings, 0)
+    else:
+        one = settings.model_copy(update={"iterations": 1})
+        for n, x in enumerate(starts):
+            started(trial, x, [], ends[:1], one, n, renewed=False)
+        tried, runs = sorted(runs, key=lambda run: run.cost), []
+        on = [run for run in tried if run.cost <= RIVALS * tried[0].cost]
+        history += [row | {"round": "rival"} for run in tried[len(on) :] for row in run.rows]
+        for n, run in enumerate(on):
+            jacobian = run.solution.jacobian if len(ends) == 1 else None
+            started(run.trial, run.solution.x, run.rows, ends, settings, n, jacobian=jacobian)
     if not runs:
         raise broken
-    best = min(runs, key=lambda run: run[0])
+    best = min(runs, key=lambda run: run.cost)
     for run in runs:
-        history += run[1] if run is best else [row | {"round": "rival"} for row in run[1]]
-    history += [row | {"round": "rival"} for row in behind]
-    return best[2:]
+        history += run.rows if run is best else [row | {"round": "rival"} for row in run.rows]
+    return best.trial, best.solution
 
 
 def windows(fitted: np.ndarray, phase: np.ndarray, share: float) -> list[int]:

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from surgisim.config.estimation import Estimation
 from surgisim.estimation import rounds
 from surgisim.estimation.search import search
 from surgisim.estimation.starts import WITHIN, Freed, _of_each_valley, at_pace, choose_starts, freed
@@ -67,54 +68,46 @@ def test_of_every_valley_one_start_comes_before_seconds_of_any():
     assert wanted.log_modulus_ratio(at[2], at[0]) == pytest.approx(2.0)
 
 
-def ends(costs: dict[float, float | None]):
-    """A descent that ends at these costs for starts of these stiffnesses, None where it breaks."""
+def ends(costs: dict[float, tuple[float, float] | None]):
+    """Descents that cost so much after a step and in the end, for starts of these stiffnesses; None where they break."""
 
-    def descend(trial, x, ends, settings, rows, say, lead):
-        cost = costs[float(x[0])]
-        if cost is None:
+    def descend(trial, x, ends, settings, rows, say, jacobian=None, renewed=True):
+        if costs[float(x[0])] is None:
             raise Breakdown("broken")
+        cost = costs[float(x[0])][0 if settings.iterations == 1 else 1]
         rows.append({"round": 0, "cost": cost})
-        return trial, SimpleNamespace(x=x, residual=cost)
+        return trial, SimpleNamespace(x=x, residual=cost, jacobian=None)
 
     return descend
 
 
-@pytest.mark.parametrize(("costs", "lowest"), [((9.0, 4.0), 1), ((4.0, 9.0), 0), ((9.0, None), 0), ((None, 9.0), 1)])
-def test_the_valley_that_ends_lowest_is_taken_and_the_others_are_told_as_rivals(monkeypatch, costs, lowest):
-    monkeypatch.setattr(rounds, "descend", ends(dict(zip((0.0, 1.0), costs, strict=True))))
+def followed(monkeypatch, *costs: tuple[float, float] | None):
+    """Which of the starts is taken, and what their descents came to, of the one that is taken and of its rivals."""
+    monkeypatch.setattr(rounds, "descend", ends(dict(enumerate(costs))))
     monkeypatch.setattr(rounds, "cost_of", lambda r, x, wanted: r)
-    history = []
-    starts = [np.array([0.0]), np.array([1.0])]
-    _, solution = rounds.lowest(SimpleNamespace(wanted=None), starts, [5], None, history, None)
-    assert solution.x is starts[lowest]
-    assert [h["cost"] for h in history if h["round"] == 0] == [costs[lowest]]
-    assert len(history) == sum(c is not None for c in costs)
+    history: list = []
+    starts = [np.array([float(k)]) for k in range(len(costs))]
+    trial = SimpleNamespace(wanted=None)
+    _, solution = rounds.lowest(trial, starts, [5], Estimation(iterations=9), history, None)
+    told = [[h["cost"] for h in history if (h["round"] == "rival") == rival] for rival in (False, True)]
+    return int(solution.x[0]), *told
 
 
-def test_a_valley_is_given_up_that_falls_behind_after_two_steps():
-    lead = [{"round": 0, "iteration": i, "cost": c} for i, c in enumerate((1000.0, 500.0, 300.0, 290.0))]
-    row = {"round": 0, "iteration": 2, "cost": 320.0}
-    assert not rounds.outrun(row, lead)
-    assert rounds.outrun(row | {"cost": 340.0}, lead)
-    assert not rounds.outrun({"round": 0, "iteration": 1, "cost": 900.0}, lead), "too early to tell"
-    assert rounds.outrun({"round": 0, "iteration": 9, "cost": 330.0}, lead), "against where the other ended"
-    assert not rounds.outrun(row | {"round": 1, "cost": 900.0}, lead), "in a round that the other has not come to"
+@pytest.mark.parametrize(("costs", "lowest"), [(((9.0, 8.0), (9.5, 4.0)), 1), (((9.0, 4.0), (9.5, 8.0)), 0)])
+def test_of_valleys_that_are_as_good_after_a_step_the_one_that_ends_lowest_is_taken(monkeypatch, costs, lowest):
+    assert followed(monkeypatch, *costs) == (lowest, list(costs[lowest]), list(costs[1 - lowest]))
 
 
-def test_what_a_given_up_descent_came_to_is_told_as_a_rivals(monkeypatch):
-    def descend(trial, x, ends, settings, rows, say, lead):
-        rows.append({"round": 0, "cost": float(x[0])})
-        if lead:
-            raise rounds.Outrun
-        return trial, SimpleNamespace(x=x, residual=float(x[0]))
+def test_a_valley_that_a_step_shows_to_be_worse_is_followed_no_farther(monkeypatch):
+    assert followed(monkeypatch, (9.0, 4.0), (12.0, 1.0)) == (0, [9.0, 4.0], [12.0])
 
-    monkeypatch.setattr(rounds, "descend", descend)
-    monkeypatch.setattr(rounds, "cost_of", lambda r, x, wanted: r)
-    history, starts = [], [np.array([4.0]), np.array([3.0])]
-    _, solution = rounds.lowest(SimpleNamespace(wanted=None), starts, [5], None, history, None)
-    assert solution.x is starts[0]
-    assert history == [{"round": 0, "cost": 4.0}, {"round": "rival", "cost": 3.0}]
+
+def test_a_start_that_breaks_leaves_the_others(monkeypatch):
+    assert followed(monkeypatch, None, (9.0, 4.0)) == (1, [9.0, 4.0], [])
+
+
+def test_a_single_start_is_followed_at_once(monkeypatch):
+    assert followed(monkeypatch, (9.0, 4.0)) == (0, [4.0], [])
 
 
 def test_where_every_start_breaks_it_is_said(monkeypatch):
