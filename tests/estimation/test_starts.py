@@ -69,7 +69,7 @@ def test_of_every_valley_one_start_comes_before_seconds_of_any():
 
 
 def ends(costs: dict[float, tuple[float, float] | None]):
-    """Descents that cost so much after a step and in the end, for starts of these stiffnesses; None where they break."""
+    """Descents that cost so much after a step and in the end, for starts of these stiffnesses; None: they break."""
 
     def descend(trial, x, ends, settings, rows, say, jacobian=None, renewed=True):
         if costs[float(x[0])] is None:
