@@ -248,13 +248,6 @@ def settle_pull(
     slow = np.array([not name.endswith((".E", ".eta", ".release")) for name in wanted.names])
     if not last or not slow.any() or slow.all():
         return trials[0], x
-    low, high = wanted.bounds
-
-    def whole(y: np.ndarray) -> np.ndarray:
-        z = x.copy()
-        z[slow] = y
-        return z
-
     # One alone needs no first heat.
     heats = [(len(trials), HEATS[0]), (FINALISTS, HEATS[1])][len(trials) < 2 :]
     work, done = sum(entrants * iterations for entrants, iterations in heats), 0
@@ -263,24 +256,18 @@ def settle_pull(
         trial: Trial, begin: np.ndarray, iterations: int, jacobian: np.ndarray | None
     ) -> tuple[float, Trial, np.ndarray, np.ndarray | None]:
         def said(iteration: int, y: np.ndarray, cost: float) -> None:
-            values = {n: float(f"{v:.4g}") for n, v in plain(wanted, whole(y)).items()}
+            values = {n: float(f"{v:.4g}") for n, v in plain(wanted, y).items()}
             edge = {"beyond": trial.laying.margin, "rim": trial.laying.rim} if trial.laying else {}
             history.append({"round": "pull", "last_frame": last, "iteration": iteration, "cost": cost} | edge | values)
             part = 0.06 * (1 + (done + iteration) / work)
             say(part, 1.0, f"shape of the pull, iteration {iteration}: {values}")
 
         try:
-            found = gauss_newton(
-                lambda y, worker: trial.residual(whole(y), worker, last), begin[slow], prior=wanted.start[slow],
-                spread=wanted.spread[slow], differences=trial.differences[slow], bounds=(low[slow], high[slow]),
-                share=INDEPENDENT, iterations=iterations, workers=WORKERS, said=said, renewed=False,
-                together=lambda ys: trial.together([whole(y) for y in ys], last), jacobian=jacobian,
-            )  # fmt: skip
+            found = _some(trial, begin, slow, last, iterations, said, jacobian)
         except Breakdown as breakdown:
             history.append({"round": "pull", "last_frame": last, "cost": None, "broke": str(breakdown)})
             return np.inf, trial, begin, jacobian
-        there = whole(found.x)
-        return cost_of(found.residual, there, wanted), trial, there, found.jacobian
+        return cost_of(found.residual, found.x, wanted), trial, found.x, found.jacobian
 
     field: list[tuple[float, Trial, np.ndarray, np.ndarray | None]] = [(0.0, trial, x, None) for trial in trials]
     for entrants, iterations in heats:
@@ -292,6 +279,33 @@ def settle_pull(
             done += iterations
         field = sorted(run, key=lambda one: one[0])
     return field[0][1:3]
+
+
+def _some(
+    trial: Trial, x: np.ndarray, free: np.ndarray, last: int, iterations: int,
+    said: Callable[[int, np.ndarray, float], None] = lambda *_: None, jacobian: np.ndarray | None = None,
+) -> Solution:  # fmt: skip
+    """Gauss-Newton from x up to frame `last` by some of the numbers only, (M,) bool; the derivative by those, (R, N).
+
+    jacobian: such a one that is nearly right there already. Raises Breakdown where x, or a little beside it, cannot be
+    simulated.
+    """
+    wanted = trial.wanted
+    low, high = (end[free] for end in wanted.bounds)
+
+    def whole(y: np.ndarray) -> np.ndarray:
+        z = x.copy()
+        z[free] = y
+        return z
+
+    found = gauss_newton(
+        lambda y, worker: trial.residual(whole(y), worker, last), x[free], prior=wanted.start[free],
+        spread=wanted.spread[free], differences=trial.differences[free], bounds=(low, high),
+        share=INDEPENDENT, iterations=iterations, workers=WORKERS,
+        said=lambda iteration, y, cost: said(iteration, whole(y), cost), renewed=False,
+        together=lambda ys: trial.together([whole(y) for y in ys], last), jacobian=jacobian,
+    )  # fmt: skip
+    return replace(found, x=whole(found.x))
 
 
 def descend(
@@ -356,44 +370,57 @@ def lowest(
 ) -> tuple[Trial, Solution]:
     """Of the descents from every start the one that ends lowest; the others' rounds are written down as rivals'.
 
-    Starts of several valleys go a step each first, and those on that then cost at most RIVALS times what the best does:
-    a start is as far from its valley's floor as moduli were tried apart, which may hide which floor is lower. Raises
-    Breakdown where none of them can be borne.
+    Those of several valleys go a step each first, by what paces a swing, and only what then costs at most RIVALS times
+    what the best does is followed: a start is as far from its valley's floor as moduli and dampings were tried apart,
+    which may hide which floor is lower. Raises Breakdown where none of them can be borne.
     """
     runs, broken = [], None
+    if len(starts) > 1:
+        starts = _stepped(trial, starts, ends[0], history, say)
+    for n, x in enumerate(starts):
 
-    def started(begin: Trial, x: np.ndarray, rows: list, ends: list[int], settings: Estimation, n: int, **more) -> None:
-        nonlocal broken
-
-        def said(done: float, whole: float, text: str) -> None:
+        def said(done: float, whole: float, text: str, n=n) -> None:
             # A descent tells of 0.25 to 0.55 of an estimation, which all of them share.
             say(0.25 + (0.3 * n + done - 0.25) / len(starts), whole, text if n == 0 else f"another valley, {text}")
 
+        rows: list = []
         try:
-            there, solution = descend(begin, x, ends, settings, rows, said, **more)
+            there, solution = descend(trial, x, ends, settings, rows, said)
         except Breakdown as breakdown:
             broken = breakdown
-            return
+            continue
         runs.append(_Run(cost_of(solution.residual, solution.x, trial.wanted), rows, there, solution))
-
-    if len(starts) == 1:
-        started(trial, starts[0], [], ends, settings, 0)
-    else:
-        one = settings.model_copy(update={"iterations": 1})
-        for n, x in enumerate(starts):
-            started(trial, x, [], ends[:1], one, n, renewed=False)
-        tried, runs = sorted(runs, key=lambda run: run.cost), []
-        on = [run for run in tried if run.cost <= RIVALS * tried[0].cost]
-        history += [row | {"round": "rival"} for run in tried[len(on) :] for row in run.rows]
-        for n, run in enumerate(on):
-            jacobian = run.solution.jacobian if len(ends) == 1 else None
-            started(run.trial, run.solution.x, run.rows, ends, settings, n, jacobian=jacobian)
     if not runs:
         raise broken
     best = min(runs, key=lambda run: run.cost)
     for run in runs:
         history += run.rows if run is best else [row | {"round": "rival"} for row in run.rows]
     return best.trial, best.solution
+
+
+def _stepped(trial: Trial, starts: list[np.ndarray], last: int, history: list, say: Say) -> list[np.ndarray]:
+    """Starts a step nearer to their valleys' floors, the cheapest first, without those that cost more than RIVALS times
+    what the best does, whose costs are written down."""
+    wanted = trial.wanted
+    free = wanted.paces | np.array([name.endswith(".release") for name in wanted.names])
+    found = []
+    for n, x in enumerate(starts, 1):
+        say(0.25, 1.0, f"a step in each of {len(starts)} valleys: {n}")
+        try:
+            step = _some(trial, x, free, last, 1)
+        except Breakdown:
+            # Where all break, a descent yet meets it with softer grips.
+            found.append((np.inf, x))
+        else:
+            found.append((cost_of(step.residual, step.x, wanted), step.x))
+    found.sort(key=lambda start: start[0])
+    near = [cost <= RIVALS * found[0][0] for cost, _ in found]
+    history += [
+        {"round": "rival", "last_frame": last, "cost": number(cost)} | plain(wanted, x)
+        for (cost, x), on in zip(found, near, strict=True)
+        if not on
+    ]
+    return [x for (_, x), on in zip(found, near, strict=True) if on]
 
 
 def windows(fitted: np.ndarray, phase: np.ndarray, share: float) -> list[int]:

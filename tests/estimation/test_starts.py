@@ -68,49 +68,76 @@ def test_of_every_valley_one_start_comes_before_seconds_of_any():
     assert wanted.log_modulus_ratio(at[2], at[0]) == pytest.approx(2.0)
 
 
-def ends(costs: dict[float, tuple[float, float] | None]):
-    """Descents that cost so much after a step and in the end, for starts of these stiffnesses; None: they break."""
+Costs = dict[float, tuple[float, float]]
 
-    def descend(trial, x, ends, settings, rows, say, jacobian=None, renewed=True):
-        if costs[float(x[0])] is None:
+
+def stepping(costs: Costs):
+    """Steps in valleys that cost so much after it, for starts of these stiffnesses."""
+
+    def some(trial, x, free, last, iterations):
+        if not np.isfinite(costs[float(x[0])][0]):
             raise Breakdown("broken")
-        cost = costs[float(x[0])][0 if settings.iterations == 1 else 1]
+        return SimpleNamespace(x=x, residual=costs[float(x[0])][0])
+
+    return some
+
+
+def descending(costs: Costs):
+    """Descents that end at such a cost, for starts of these stiffnesses."""
+
+    def descend(trial, x, ends, settings, rows, say):
+        cost = costs[float(x[0])][1]
+        if not np.isfinite(cost):
+            raise Breakdown("broken")
         rows.append({"round": 0, "cost": cost})
-        return trial, SimpleNamespace(x=x, residual=cost, jacobian=None)
+        return trial, SimpleNamespace(x=x, residual=cost)
 
     return descend
 
 
-def followed(monkeypatch, *costs: tuple[float, float] | None):
-    """Which of the starts is taken, and what their descents came to, of the one that is taken and of its rivals."""
-    monkeypatch.setattr(rounds, "descend", ends(dict(enumerate(costs))))
+def followed(monkeypatch, *costs: tuple[float, float]):
+    """Which of the starts is taken, of those that cost so much after a step and at their ends, and what is told of the
+    one that is taken and of its rivals."""
+    monkeypatch.setattr(rounds, "_some", stepping(dict(enumerate(costs))))
+    monkeypatch.setattr(rounds, "descend", descending(dict(enumerate(costs))))
     monkeypatch.setattr(rounds, "cost_of", lambda r, x, wanted: r)
     history: list = []
     starts = [np.array([float(k)]) for k in range(len(costs))]
-    trial = SimpleNamespace(wanted=None)
-    _, solution = rounds.lowest(trial, starts, [5], Estimation(iterations=9), history, None)
+    trial = SimpleNamespace(wanted=search(["corotated"], {}, ["corotated.nu"]))
+    _, solution = rounds.lowest(trial, starts, [5], Estimation(), history, lambda *_: None)
     told = [[h["cost"] for h in history if (h["round"] == "rival") == rival] for rival in (False, True)]
     return int(solution.x[0]), *told
 
 
 @pytest.mark.parametrize(("costs", "lowest"), [(((9.0, 8.0), (9.5, 4.0)), 1), (((9.0, 4.0), (9.5, 8.0)), 0)])
 def test_of_valleys_that_are_as_good_after_a_step_the_one_that_ends_lowest_is_taken(monkeypatch, costs, lowest):
-    assert followed(monkeypatch, *costs) == (lowest, list(costs[lowest]), list(costs[1 - lowest]))
+    assert followed(monkeypatch, *costs) == (lowest, [costs[lowest][1]], [costs[1 - lowest][1]])
 
 
 def test_a_valley_that_a_step_shows_to_be_worse_is_followed_no_farther(monkeypatch):
-    assert followed(monkeypatch, (9.0, 4.0), (12.0, 1.0)) == (0, [9.0, 4.0], [12.0])
+    assert followed(monkeypatch, (12.0, 1.0), (9.0, 4.0)) == (1, [4.0], [12.0])
 
 
 def test_a_start_that_breaks_leaves_the_others(monkeypatch):
-    assert followed(monkeypatch, None, (9.0, 4.0)) == (1, [9.0, 4.0], [])
+    assert followed(monkeypatch, (np.inf, 1.0), (9.0, 4.0)) == (1, [4.0], [None])
+    assert followed(monkeypatch, (9.2, np.inf), (9.0, 4.0)) == (1, [4.0], [])
 
 
 def test_a_single_start_is_followed_at_once(monkeypatch):
-    assert followed(monkeypatch, (9.0, 4.0)) == (0, [4.0], [])
+    assert followed(monkeypatch, (np.inf, 4.0)) == (0, [4.0], [])
 
 
 def test_where_every_start_breaks_it_is_said(monkeypatch):
-    monkeypatch.setattr(rounds, "descend", ends({0.0: None}))
     with pytest.raises(Breakdown):
-        rounds.lowest(SimpleNamespace(wanted=None), [np.array([0.0])], [5], None, [], None)
+        followed(monkeypatch, (np.inf, np.inf), (np.inf, np.inf))
+
+
+def test_a_step_by_some_numbers_leaves_the_others():
+    trial, _ = clip_length.trial(2 * clip_length.PERIOD)
+    x, wanted = trial.wanted.start, trial.wanted
+    last = int(trial.fitted[-1])
+    found = rounds._some(trial, x, wanted.paces, last, 1)
+    assert (found.x != x).tolist() == wanted.paces.tolist()
+    assert found.jacobian.shape == (len(found.residual), wanted.paces.sum())
+    before = rounds.cost_of(trial.residual(x, 0, last), x, wanted)
+    assert rounds.cost_of(found.residual, found.x, wanted) < before
