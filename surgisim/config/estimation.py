@@ -53,7 +53,7 @@ class Estimation(Settings):
     sees twice as many [-]."""
     field: list[str] = ["corotated.E", "newtonian.eta"]
     """'law.parameter' entries refined per particle, where that pays on frames kept from the refinement [-]."""
-    field_iterations: int = Field(6, ge=0, le=200)
+    field_iterations: int = Field(12, ge=0, le=200)
     """Adjoint iterations of the per-particle refinement; 0 leaves parameters uniform [-]."""
     smoothness: float = Field(3.0, ge=0)
     """Weight of the total variation of per-particle parameters, against the data's misfit [-]."""

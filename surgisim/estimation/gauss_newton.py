@@ -54,7 +54,7 @@ def gauss_newton(
     residual(x, worker) may be called from `workers` threads at once, each with its own number; it
     returns None where x cannot be simulated, which only a trial step may meet. together(xs) gives the residuals of
     several x at once, where that is quicker. jacobian: a derivative, (R, M), nearly right at x, to begin with.
-    renewed: whether the derivative that is returned must have been taken at the end.
+    renewed: whether the derivative that is returned must have been taken at the end, or a last, small step before it.
     Nocedal and Wright, Numerical optimization, 2nd ed. (2006), section 10.3; between derivatives by differences, which
     cost a simulation a number, Broyden's update (ibid., section 11.1). A number at a bound that the cost would drive
     beyond it stays there, and the others step as if it were known (Bertsekas, Projected Newton methods, SIAM J. Control
@@ -100,18 +100,17 @@ def gauss_newton(
                 J, fresh = jacobian_at(x, r), True
         moved, gained = best[0] - x, (cost - best[2]) / max(cost, 1e-30)
         # Broyden's update: a derivative that agrees with the step just made costs no further simulations.
-        J = J + np.outer((best[1] - r - J @ moved) / (moved @ moved), moved)
+        taken, J = J, J + np.outer((best[1] - r - J @ moved) / (moved @ moved), moved)
         x, r, cost, damping = best[0], best[1], best[2], max(best[3], 1e-6)
         said(iteration, x, cost)
         if iteration == iterations and not renewed:
             return Solution(x, r, J)
         small = np.abs(moved).max() < 5e-3 or gained < 3e-4
-        done = small and fresh
+        if small and fresh:
+            return Solution(x, r, taken)
         # One that was just taken is followed a step farther before it is taken again.
         stale = not fresh and (small or gained < RENEWED)
         J, fresh = (jacobian_at(x, r), True) if stale else (J, False)
-        if done:
-            break
     return Solution(x, r, J if fresh or not renewed else jacobian_at(x, r))
 
 

@@ -6,8 +6,10 @@ s is the logarithm of each parameter relative to its uniform fit. The paper's eq
 ours keeps a refinement only where frames kept from it agree.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -17,13 +19,15 @@ from surgisim.estimation.observation import Observation
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.simulator import Breakdown, Run, Simulator
 
-RATE, LEAST = 0.3, 0.005
-"""First step in the logarithm, root mean square, and the one below which none is tried any more; chosen,
-as what follows."""
-LONGER, SHORTER = 1.2, (0.05, 0.5)
-"""Times the step after one that fits better; after one that does not, between which, as a parabola has it."""
-KEEPS = 0.6
-"""Share of the last direction in the next."""
+BEGINS, LEAST, MOST = 0.05, 0.001, 1.0
+"""Root mean square of the first step in the logarithm, of one below which none is tried any more, and of the longest;
+chosen, as what follows."""
+SHORTER = (0.05, 0.5)
+"""Times the step after one that does not fit better, between which, as a parabola has it."""
+MEMORY = 8
+"""How many of the last steps tell how the slope changes."""
+SMOOTHED = 8
+"""How often neighbours share their slope, so that a step is as smooth as the field it makes."""
 STAYS = 1.0
 """How far around a place that broke tissue stays as it is, in grid cells."""
 FIRMEST = 8.0
@@ -104,59 +108,100 @@ def refine(
         judged = _track_loss(observation, run.u, judge)[0]
         return _Tried(s, now, path, run, track, picture, judged, track + image_weight * picture + rough, u_bar)
 
-    def downhill(at: _Tried) -> tuple[np.ndarray, np.ndarray]:
-        """The direction of descent, root mean square 1, and the loss's derivative by s, both (P, M)."""
-        gradient = simulator.gradient(at.theta, at.drive, at.run, at.u_bar).theta[:, columns] * at.theta[:, columns]
+    def slope_at(at: _Tried) -> np.ndarray:
+        """The loss's derivative by s, (P, M)."""
+        slope = simulator.gradient(at.theta, at.drive, at.run, at.u_bar).theta[:, columns] * at.theta[:, columns]
         difference = 2 * smoothness * (at.s[own] - at.s[other]) / len(own)
         for c in range(at.s.shape[1]):
-            gradient[:, c] += np.bincount(own, difference[:, c], len(at.s))
-            gradient[:, c] -= np.bincount(other, difference[:, c], len(at.s))
-        # Neighbours share their gradient, so that a step is as smooth as the field it makes.
-        smooth = gradient
-        for _ in range(8):
-            smooth = smooth[pairs].mean(1)
-        return -_even(smooth), gradient
+            slope[:, c] += np.bincount(own, difference[:, c], len(at.s))
+            slope[:, c] -= np.bincount(other, difference[:, c], len(at.s))
+        return slope
 
     begun = at = best = tried(np.zeros((len(theta), len(columns))))
     history = [_row(0, at)]
     free = np.ones((len(theta), 1))
-    down, slope = downhill(at)
-    way, rate, patience = down, RATE, PATIENCE
+    slope, past = slope_at(at), _Past(partial(_smoothed, pairs=pairs))
+    way, rate, patience = past.way(slope, free), 1.0, PATIENCE
     for k in range(1, iterations + 1):
         said = f"refinement {k}/{iterations}, misfit {at.track:.3f}, on kept frames {at.judged:.3f}"
         progress(k, iterations + 1, said)
+        new = None
         try:
             new = tried(at.s + rate * free * way)
         except Breakdown as breakdown:
             # A field that cannot be simulated is no candidate. Where it broke, tissue stays as it is from there on.
-            new = None
             if breakdown.particle is not None:
                 away = np.linalg.norm(simulator.rest - simulator.rest[breakdown.particle], axis=1)
                 free *= 1 - np.exp(-((away / (STAYS * simulator.grid.spacing)) ** 2))[:, None]
                 continue
         if new is None or new.loss >= at.loss:
-            # A shorter step, straight downhill from then on.
             rate *= (
                 SHORTER[1] if new is None else _shorter(rate * float((slope * free * way).sum()), new.loss - at.loss)
             )
-            way = down
-            if rate < LEAST:
+            if rate * _size(free * way) < LEAST:
                 break
             continue
+        before, flatter = at, slope
         at = new
         history.append(_row(k, at))
         best, patience = (at, PATIENCE) if at.judged < best.judged else (best, patience - 1)
         if not patience or k == iterations:
             break
-        down, slope = downhill(at)
-        way, rate = _even(KEEPS * way + down), LONGER * rate
+        slope = slope_at(at)
+        past.met(at.s - before.s, slope - flatter)
+        way, rate = past.way(slope, free), 1.0
     kept = best.judged < begun.judged * (1 - 0.01)
     return Refined(best.theta if kept else theta, bool(kept), history)
 
 
-def _even(way: np.ndarray) -> np.ndarray:
-    """A direction (P, M) over its root mean square: what hardly matters hardly changes."""
-    return way / (np.sqrt((way**2).mean()) + 1e-30)
+class _Past:
+    """What the last steps told of how the slope changes.
+
+    Limited-memory BFGS (Nocedal and Wright, Numerical optimization, 2nd ed., 2006, algorithm 7.4), which begins from a
+    multiple of `smooth` where it usually does from one of the identity.
+    """
+
+    def __init__(self, smooth: Callable[[np.ndarray], np.ndarray]) -> None:
+        self.smooth = smooth
+        self.steps: deque[tuple[np.ndarray, np.ndarray]] = deque(maxlen=MEMORY)
+
+    def met(self, step: np.ndarray, change: np.ndarray) -> None:
+        """Over this step, (P, M), the slope changed by so much."""
+        # Where it became steeper, there is no bottom to step to.
+        if (step * change).sum() > 0:
+            self.steps.append((step, change))
+
+    def way(self, slope: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """The step down from where the slope is this, (P, M); free: share of it that may be made, (P, 1)."""
+        way = self._toward_bottom(slope) if self.steps else None
+        if way is None or (free * way * slope).sum() >= 0:
+            self.steps.clear()
+            way = -self.smooth(slope)
+            return BEGINS * way / (_size(way) + 1e-30)
+        return way * min(1.0, MOST / _size(way))
+
+    def _toward_bottom(self, slope: np.ndarray) -> np.ndarray:
+        left, shares = slope.copy(), []
+        for step, change in reversed(self.steps):
+            shares.append((step * left).sum() / (step * change).sum())
+            left -= shares[-1] * change
+        step, change = self.steps[-1]
+        way = self.smooth(left) * (step * change).sum() / (change * self.smooth(change)).sum()
+        for (step, change), share in zip(self.steps, reversed(shares), strict=True):
+            way += step * (share - (change * way).sum() / (step * change).sum())
+        return -way
+
+
+def _smoothed(slope: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Slopes (P, M) as neighbours `pairs`, (P, N), share them."""
+    for _ in range(SMOOTHED):
+        slope = slope[pairs].mean(1)
+    return slope
+
+
+def _size(way: np.ndarray) -> float:
+    """Root mean square."""
+    return float(np.sqrt((way**2).mean()))
 
 
 def _shorter(begins: float, ended: float) -> float:

@@ -8,6 +8,7 @@ faster or slower. That leaves out weight, and what still swings when it is let g
 
 import itertools
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,8 @@ OPENING = (-0.5, 0.0, 0.5)
 """How many frames later the tissue is let go."""
 WITHIN = 4
 """States kept between two frames, to read a swing at another pace."""
+NEXT = 1
+"""Of SOFTER, how far from a valley's modulus it lies at the next of DAMPING."""
 SIMULATED = 5
 """How many of the likeliest starts are simulated."""
 APART = 0.35
@@ -68,8 +71,8 @@ def choose_starts(trial: Trial, begin: np.ndarray, history: list, say: Say) -> l
     free = freed(wanted.motion(begin, trial.motion), trial.frames)
     if free:
         say(0.13, 1.0, f"reading {len(SOFTER)} moduli off each of {len(DAMPING)} ring-downs")
-        read = at_once(lambda damping, worker: list(valleys(trial, begin, damping, free, worker)), list(DAMPING))
-        found = [x for _, x in sorted(itertools.chain(*read), key=lambda start: start[0])]
+        read = at_once(lambda damping, worker: ring_down(trial, begin, damping, free, worker), list(DAMPING))
+        found = [x for _, x in sorted(valleys(wanted, begin, read), key=lambda start: start[0])]
         points = list(itertools.chain(*_of_each_valley(found, wanted)))[:SIMULATED]
     if not free or not points:
         points = [np.clip(wanted.paced(begin, 0.0, damping), *wanted.bounds) for damping in DAMPING]
@@ -111,31 +114,60 @@ def freed(motion: Motion, frames: int) -> Freed | None:
     return Freed(float(opens), min(last, frames - 1))
 
 
-def valleys(
+def ring_down(
     trial: Trial, begin: np.ndarray, damping: float, free: Freed, worker: int = 0
-) -> Iterator[tuple[float, np.ndarray]]:
-    """Cost and place of every modulus that fits better than the next ones, at one damping, as read off one ring-down.
-
-    Nothing where that cannot be simulated.
-    """
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cost of every modulus of SOFTER at one damping, as read off one ring-down, and how many frames later tissue is
+    let go where that is least, (S,) each. Costs are infinite where the ring-down cannot be simulated."""
     wanted = trial.wanted
-    low, high = wanted.bounds
-    stiff = wanted.paced(begin, STIFFEST, damping)
-    try:
-        held, swing, observation = trial.closely(np.clip(stiff, low, high), free.since, free.last, WITHIN, worker)
-    except Breakdown:
-        return
-    opens = np.array([name.endswith(".release") for name in wanted.names])
-    best = []
-    for softer in SOFTER:
-        tried = []
-        for later in OPENING if opens.any() else (0.0,):
-            x = np.clip(wanted.paced(stiff, softer) + later * opens, low, high)
-            u = at_pace(held, swing, free, float(np.exp(0.5 * softer)), later)
-            tried.append((cost_of(trial.judged(u, observation, free.last), x, wanted), x))
-        best.append(min(tried, key=lambda start: start[0]))
-    cost = np.array([np.inf, *(c for c, _ in best), np.inf])
-    yield from (best[k] for k in range(len(best)) if cost[k + 1] <= min(cost[k], cost[k + 2]))
+    cost, opening = np.full(len(SOFTER), np.inf), np.zeros(len(SOFTER))
+    with suppress(Breakdown):
+        begun = _place(wanted, begin, damping, 0.0, 0.0)
+        held, swing, observation = trial.closely(begun, free.since, free.last, WITHIN, worker)
+        for k, softer in enumerate(SOFTER):
+            for later in OPENING if _opens(wanted).any() else (0.0,):
+                u = at_pace(held, swing, free, float(np.exp(0.5 * softer)), later)
+                x = _place(wanted, begin, damping, softer, later)
+                one = cost_of(trial.judged(u, observation, free.last), x, wanted)
+                if one < cost[k]:
+                    cost[k], opening[k] = one, later
+    return cost, opening
+
+
+def valleys(
+    wanted: Search, begin: np.ndarray, read: list[tuple[np.ndarray, np.ndarray]]
+) -> Iterator[tuple[float, np.ndarray]]:
+    """Cost and place of every modulus that fits better than the next ones, of what was `read` at each of DAMPING.
+
+    Dampings are tried far apart: one that fits better than those beside it is moved to where a parabola through their
+    costs is lowest.
+    """
+    cost = np.array([costs for costs, _ in read])
+    beside = np.pad(cost, ((0, 0), (1, 1)), constant_values=np.inf)
+    least = np.isfinite(cost) & (cost <= np.minimum(beside[:, :-2], beside[:, 2:]))
+    for d, m in zip(*np.nonzero(least), strict=True):
+        # Tissue that is damped otherwise swings a little faster or slower.
+        near = cost[:, max(0, m - NEXT) : m + NEXT + 1].min(1)
+        damping = DAMPING[d]
+        if 0 < d < len(DAMPING) - 1 and cost[d, m] < near[d - 1] < np.inf and cost[d, m] < near[d + 1] < np.inf:
+            damping = _lowest(DAMPING[d - 1 : d + 2], (near[d - 1], cost[d, m], near[d + 1]))
+        yield float(cost[d, m]), _place(wanted, begin, damping, SOFTER[m], read[d][1][m])
+
+
+def _place(wanted: Search, begin: np.ndarray, damping: float, softer: float, later: float) -> np.ndarray:
+    """Where tissue is so much damped, softer than STIFFEST and later let go, (M,)."""
+    x = wanted.paced(wanted.paced(begin, STIFFEST, damping), softer)
+    return np.clip(x + later * _opens(wanted), *wanted.bounds)
+
+
+def _opens(wanted: Search) -> np.ndarray:
+    """Which numbers say when jaws open, (M,) bool."""
+    return np.array([name.endswith(".release") for name in wanted.names])
+
+
+def _lowest(at: tuple[float, float, float], costs: tuple[float, float, float]) -> float:
+    """Where the parabola through three costs is lowest."""
+    return float(np.polynomial.Polynomial.fit(at, costs, 2).deriv().roots()[0])
 
 
 def at_pace(held: np.ndarray, swing: np.ndarray, free: Freed, pace: float, later: float) -> np.ndarray:

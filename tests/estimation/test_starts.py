@@ -8,7 +8,17 @@ import pytest
 from surgisim.config.estimation import Estimation
 from surgisim.estimation import rounds
 from surgisim.estimation.search import search
-from surgisim.estimation.starts import WITHIN, Freed, _of_each_valley, at_pace, choose_starts, freed
+from surgisim.estimation.starts import (
+    DAMPING,
+    SOFTER,
+    WITHIN,
+    Freed,
+    _of_each_valley,
+    at_pace,
+    choose_starts,
+    freed,
+    valleys,
+)
 from surgisim.mpm.simulator import Breakdown
 from surgisim.verification import clip_length
 
@@ -66,6 +76,24 @@ def test_of_every_valley_one_start_comes_before_seconds_of_any():
     assert len(first) == 2
     assert wanted.log_modulus_ratio(at[0], at[1]) == pytest.approx(0.1)
     assert wanted.log_modulus_ratio(at[2], at[0]) == pytest.approx(2.0)
+
+
+def test_a_damping_between_those_that_were_read_is_found():
+    wanted = search(["corotated", "newtonian"], {}, [])
+    modulus, damping = -1.0, 0.4
+    read = [(np.abs(SOFTER - modulus) + (d - damping) ** 2, np.zeros(len(SOFTER))) for d in DAMPING]
+    _, x = min(valleys(wanted, wanted.start, read), key=lambda start: start[0])
+    there, start = wanted.values(x), wanted.values(wanted.start)
+    assert there["corotated"]["E"] == pytest.approx(start["corotated"]["E"] * np.exp(0.8 + modulus))
+    paced = np.exp(0.5 * (0.8 + modulus) + damping)
+    assert there["newtonian"]["eta"] == pytest.approx(start["newtonian"]["eta"] * paced)
+    # Where a ring-down cannot be simulated, its neighbours stay where they were read.
+    read[1] = np.full(len(SOFTER), np.inf), read[1][1]
+    _, x = min(valleys(wanted, wanted.start, read), key=lambda start: start[0])
+    assert (
+        min(abs(np.log(wanted.values(x)["newtonian"]["eta"] / start["newtonian"]["eta"]) + 0.1 - np.array(DAMPING)))
+        < 1e-6
+    )
 
 
 Costs = dict[float, tuple[float, float]]
