@@ -313,9 +313,9 @@ def _weighed(
     if chosen:
         begun = replace(found[0], one=Otherwise("as first found", first, rival=True), x=solution.x)
         found = [a for a in found[1:] if a is not chosen] + [begun] * (chosen is not found[0])
-        trial, solution = descend(
-            chosen.one.trial, chosen.x, ends, settings, history, progress, jacobian=chosen.jacobian
-        )
+        # It was followed to where it is nearly lowest; what it takes for granted is asked from a derivative of its own.
+        once = settings.model_copy(update={"iterations": 1})
+        trial, solution = descend(chosen.one.trial, chosen.x, ends, once, history, progress, jacobian=chosen.jacobian)
     else:
         found = found[1:]
     ask_here = list(ask(trial, solution.x))

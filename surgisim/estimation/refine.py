@@ -19,11 +19,14 @@ from surgisim.estimation.observation import Observation
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.simulator import Breakdown, Run, Simulator
 
-BEGINS, LEAST, MOST = 0.05, 0.001, 1.0
+BEGINS, LEAST, MOST = 0.05, 0.001, 0.5
 """Root mean square of the first step in the logarithm, of one below which none is tried any more, and of the longest;
 chosen, as what follows."""
+LONGER = 2.0
+"""Times the last step, where the way down became steeper over it."""
 SHORTER = (0.05, 0.5)
-"""Times the step after one that does not fit better, between which, as a parabola has it."""
+"""Times the step after one that does not fit better, between which, as a parabola has it; the latter where tissue
+breaks."""
 MEMORY = 8
 """How many of the last steps tell how the slope changes."""
 SMOOTHED = 8
@@ -33,6 +36,8 @@ STAYS = 1.0
 FIRMEST = 8.0
 """How many times stiffer than the uniform fit any part may become: beyond that it moves as one piece, and only makes
 every step of every run after it shorter."""
+TRIES = 3
+"""Steps tried, at most, for each that may be kept."""
 PATIENCE = 3
 """Better fits in a row that do not fit the kept frames better after which no more are sought."""
 
@@ -121,11 +126,11 @@ def refine(
     history = [_row(0, at)]
     free = np.ones((len(theta), 1))
     slope, past = slope_at(at), _Past(partial(_smoothed, pairs=pairs))
-    way, rate, patience = past.way(slope, free), 1.0, PATIENCE
-    for k in range(1, iterations + 1):
+    way, rate, patience, tries = past.way(slope, free), 1.0, PATIENCE, 0
+    while patience and len(history) <= iterations and rate * _size(free * way) >= LEAST and tries < TRIES * iterations:
+        k, tries = len(history), tries + 1
         said = f"refinement {k}/{iterations}, misfit {at.track:.3f}, on kept frames {at.judged:.3f}"
         progress(k, iterations + 1, said)
-        new = None
         try:
             new = tried(at.s + rate * free * way)
         except Breakdown as breakdown:
@@ -133,23 +138,19 @@ def refine(
             if breakdown.particle is not None:
                 away = np.linalg.norm(simulator.rest - simulator.rest[breakdown.particle], axis=1)
                 free *= 1 - np.exp(-((away / (STAYS * simulator.grid.spacing)) ** 2))[:, None]
-                continue
-        if new is None or new.loss >= at.loss:
-            rate *= (
-                SHORTER[1] if new is None else _shorter(rate * float((slope * free * way).sum()), new.loss - at.loss)
-            )
-            if rate * _size(free * way) < LEAST:
-                break
+            rate *= SHORTER[1]
             continue
-        before, flatter = at, slope
+        if new.loss >= at.loss:
+            rate *= _shorter(rate * float((slope * free * way).sum()), new.loss - at.loss)
+            continue
+        before, steeper = at, slope
         at = new
         history.append(_row(k, at))
         best, patience = (at, PATIENCE) if at.judged < best.judged else (best, patience - 1)
-        if not patience or k == iterations:
-            break
-        slope = slope_at(at)
-        past.met(at.s - before.s, slope - flatter)
-        way, rate = past.way(slope, free), 1.0
+        if patience and k < iterations:
+            slope = slope_at(at)
+            past.met(at.s - before.s, slope - steeper)
+            way, rate = past.way(slope, free), 1.0
     kept = best.judged < begun.judged * (1 - 0.01)
     return Refined(best.theta if kept else theta, bool(kept), history)
 
@@ -164,20 +165,23 @@ class _Past:
     def __init__(self, smooth: Callable[[np.ndarray], np.ndarray]) -> None:
         self.smooth = smooth
         self.steps: deque[tuple[np.ndarray, np.ndarray]] = deque(maxlen=MEMORY)
+        self.begins = BEGINS
 
     def met(self, step: np.ndarray, change: np.ndarray) -> None:
         """Over this step, (P, M), the slope changed by so much."""
-        # Where it became steeper, there is no bottom to step to.
         if (step * change).sum() > 0:
             self.steps.append((step, change))
+        else:
+            # It became steeper: there is no bottom to step to yet.
+            self.steps.clear()
+            self.begins = min(MOST, LONGER * _size(step))
 
     def way(self, slope: np.ndarray, free: np.ndarray) -> np.ndarray:
         """The step down from where the slope is this, (P, M); free: share of it that may be made, (P, 1)."""
         way = self._toward_bottom(slope) if self.steps else None
         if way is None or (free * way * slope).sum() >= 0:
-            self.steps.clear()
             way = -self.smooth(slope)
-            return BEGINS * way / (_size(way) + 1e-30)
+            return self.begins * way / (_size(way) + 1e-30)
         return way * min(1.0, MOST / _size(way))
 
     def _toward_bottom(self, slope: np.ndarray) -> np.ndarray:
