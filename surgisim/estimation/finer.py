@@ -22,8 +22,8 @@ Say = Callable[[float, float, str], None]
 def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[Trial, Solution]:
     """The fit on a finer grid; the same one, with a line in `history`, where that cannot be simulated.
 
-    The first steps go by the wider grid's derivative. Then the laws' numbers, on which waves depend, get one of their
-    own; how tissue is carried and how deep it is held moves it alike on both grids.
+    The first steps go by the wider grid's derivative. Then what paces waves gets one of its own; how tissue is carried,
+    how deep it is held and how its volume gives way moves it alike on both grids.
     """
     fine = replace(trial, laying=trial.laying.finer(FINER))
     # Steps are simulated one after another, so each has all the threads.
@@ -38,12 +38,12 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
         return trial, solution
     say(0.4, 1.0, f"on a finer grid: {plain(wanted, found.x)}")
     try:
-        laws = np.arange(len(found.x)) < len(wanted.free)
-        own = derivative(fine.together, found.x, found.residual, np.where(laws, fine.differences, 0.0), wanted.bounds)
+        waves = np.where(wanted.paces, fine.differences, 0.0)
+        own = derivative(fine.together, found.x, found.residual, waves, wanted.bounds)
     except Breakdown as breakdown:
         history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
         return trial, solution
-    here = Solution(found.x, found.residual, np.where(laws, own, found.jacobian))
+    here = Solution(found.x, found.residual, np.where(wanted.paces, own, found.jacobian))
     found = settled(Otherwise("finer grid", alone, begin=found.x), here, enough=NEARLY)
     history.append({"round": "finer grid", "cost": number(found.cost)} | plain(wanted, found.x))
     return fine, replace(here, x=found.x, residual=found.residual)
