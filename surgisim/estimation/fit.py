@@ -334,8 +334,7 @@ def _weighed(
 def _known(trial: Trial, solution: Solution, model: dict, phase: np.ndarray, settings: Estimation) -> dict:
     """What a solution tells of the tissue itself: what its grid gets wrong is taken off, and counts as not known."""
     x, measured = solution.x, (trial.observation.weight[..., 2] > 0).any()
-    opens = np.array([name.endswith(".release") for name in trial.wanted.names])
-    model = model | {"how jaws open": np.diag((OPENS * opens) ** 2)}
+    model = model | {"how jaws open": np.diag((OPENS * trial.wanted.opens) ** 2)}
     if trial.laying:
         off, doubt = on_no_grid(trial, x)
         model = model | {

@@ -402,7 +402,7 @@ def _stepped(trial: Trial, starts: list[np.ndarray], last: int, history: list, s
     """Starts a step nearer to their valleys' floors, the cheapest first, without those that cost more than RIVALS times
     what the best does, whose costs are written down."""
     wanted = trial.wanted
-    free = wanted.paces | np.array([name.endswith(".release") for name in wanted.names])
+    free = wanted.paces | wanted.opens
     found = []
     for n, x in enumerate(starts, 1):
         say(0.25, 1.0, f"a step in each of {len(starts)} valleys: {n}")

@@ -82,6 +82,11 @@ class Search:
         laws = [p.logarithmic and p.unit in PACE for *_, p in self.free]
         return np.array(laws + [False] * len(self.open), bool)
 
+    @property
+    def opens(self) -> np.ndarray:
+        """Which numbers say when jaws open, (M,) bool."""
+        return np.array([name.endswith(".release") for name in self.names], bool)
+
     def paced(self, x: np.ndarray, modulus: float, damping: float = 0.0) -> np.ndarray:
         """x with moduli that many logarithms higher, at the same swing at another pace; then viscosities so much."""
         moved = x.copy()

@@ -125,7 +125,7 @@ def ring_down(
         begun = _place(wanted, begin, damping, 0.0, 0.0)
         held, swing, observation = trial.closely(begun, free.since, free.last, WITHIN, worker)
         for k, softer in enumerate(SOFTER):
-            for later in OPENING if _opens(wanted).any() else (0.0,):
+            for later in OPENING if wanted.opens.any() else (0.0,):
                 u = at_pace(held, swing, free, float(np.exp(0.5 * softer)), later)
                 x = _place(wanted, begin, damping, softer, later)
                 one = cost_of(trial.judged(u, observation, free.last), x, wanted)
@@ -157,12 +157,7 @@ def valleys(
 def _place(wanted: Search, begin: np.ndarray, damping: float, softer: float, later: float) -> np.ndarray:
     """Where tissue is so much damped, softer than STIFFEST and later let go, (M,)."""
     x = wanted.paced(wanted.paced(begin, STIFFEST, damping), softer)
-    return np.clip(x + later * _opens(wanted), *wanted.bounds)
-
-
-def _opens(wanted: Search) -> np.ndarray:
-    """Which numbers say when jaws open, (M,) bool."""
-    return np.array([name.endswith(".release") for name in wanted.names])
+    return np.clip(x + later * wanted.opens, *wanted.bounds)
 
 
 def _lowest(at: tuple[float, float, float], costs: tuple[float, float, float]) -> float:
