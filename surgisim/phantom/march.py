@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ from surgisim.problem import Problem
 
 SAFETY = 0.6
 """Of the largest stable step at rest; stretched and squeezed elements need smaller ones."""
+FINER = 2
+"""Times more steps a frame with which all is moved once more where they were too few after all."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +34,18 @@ class Drive:
 def march(block: Block, parts: Elements, drive: Drive, times: np.ndarray, progress=None) -> np.ndarray:
     """Node positions [m], (T, N, 3), at evenly spaced `times` [s] beginning at rest at times[0].
 
-    Raises Problem, naming time and node, when a position is not finite or an element turns inside out.
+    Raises Problem, naming time and node, when a position is not finite or an element turns inside out with FINER times
+    the steps that are stable at rest.
     """
     frame = float(times[1] - times[0])
     substeps = math.ceil(frame / (SAFETY * stable_step(block.points, parts, block.fixed)))
-    dt = frame / substeps
+    with suppress(Problem):
+        return _march(block, parts, drive, times, substeps, progress)
+    return _march(block, parts, drive, times, FINER * substeps, progress)
+
+
+def _march(block: Block, parts: Elements, drive: Drive, times: np.ndarray, substeps: int, progress) -> np.ndarray:
+    dt = float(times[1] - times[0]) / substeps
     x, v = block.points.copy(), np.zeros_like(block.points)
     positions = np.empty((len(times), *x.shape))
     positions[0] = x

@@ -6,6 +6,7 @@ from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import ConvexHull
 from tissue_pieces import slab
 
+from surgisim.phantom import march as march_module
 from surgisim.phantom.block import mesh
 from surgisim.phantom.elements import elements
 from surgisim.phantom.law import Law
@@ -67,3 +68,18 @@ def test_a_grip_that_reaches_the_base_is_refused():
     shape, grip = slab(thickness=0.006)
     with pytest.raises(Problem, match="grip_radius"):
         mesh(shape, grip, 0.0025, hold_sides=False)
+
+
+def test_tissue_that_too_few_steps_blow_up_is_moved_with_more(monkeypatch):
+    shape, grip = slab(half=0.016)
+    block = mesh(shape, grip, 0.0028, hold_sides=False)
+    parts = elements(block.points, block.cells, Law(E=1000.0, nu=0.45, eta=2.0, density=1050.0))
+    drive = Drive(lambda t: ease(t / 0.05)[:, None] * np.array([0.002, 0.0, -0.002]), -1.0, 9.0)
+    times = np.linspace(0, 0.06, 4)
+    moved = march(block, parts, drive, times)
+    stable = march_module.stable_step(block.points, parts, block.fixed)
+    monkeypatch.setattr(march_module, "stable_step", lambda *_: 1.6 * stable / march_module.SAFETY)
+    assert np.abs(march(block, parts, drive, times) - moved).max() < 2e-5
+    monkeypatch.setattr(march_module, "FINER", 1)
+    with pytest.raises(Problem, match=r"not finite|inside out"):
+        march(block, parts, drive, times)
