@@ -24,7 +24,7 @@ BEGINS, LEAST, MOST = 0.05, 0.001, 0.5
 chosen, as what follows."""
 LONGER = 2.0
 """Times the last step, where the way down became steeper over it."""
-SHORTER, BROKEN = (0.05, 0.5), 0.7
+SHORTER, BROKEN = (0.05, 0.5), 0.5
 """Times the step after one that does not fit better, between which, as a parabola has it, and where tissue breaks."""
 MEMORY = 8
 """How many of the last steps tell how the slope changes."""
