@@ -24,8 +24,9 @@ BEGINS, LEAST, MOST = 0.05, 0.001, 0.5
 chosen, as what follows."""
 LONGER = 2.0
 """Times the last step, where the way down became steeper over it."""
-SHORTER, BROKEN = (0.05, 0.5), 0.5
-"""Times the step after one that does not fit better, between which, as a parabola has it, and where tissue breaks."""
+SHORTER = (0.05, 0.5)
+"""Times the step after one that does not fit better, between which, as a parabola has it; the latter where tissue
+breaks."""
 MEMORY = 8
 """How many of the last steps tell how the slope changes."""
 SMOOTHED = 8
@@ -35,9 +36,6 @@ STAYS = 1.0
 FIRMEST = 8.0
 """How many times stiffer than the uniform fit any part may become: beyond that it moves as one piece, and only makes
 every step of every run after it shorter."""
-NOISE = 1.5
-"""Misfit of kept frames from which what is left is little more than noise, which alone leaves 1: no field is asked to
-follow that."""
 TRIES = 3
 """Steps tried, at most, for each that may be kept."""
 PATIENCE = 3
@@ -129,10 +127,8 @@ def refine(
     free = np.ones((len(theta), 1))
     slope, past = slope_at(at), _Past(partial(_smoothed, pairs=pairs))
     way, rate, patience, tries = past.way(slope, free), 1.0, PATIENCE, 0
-    while patience and tries < TRIES * iterations and rate * _size(free * way) >= LEAST:
+    while patience and len(history) <= iterations and rate * _size(free * way) >= LEAST and tries < TRIES * iterations:
         k, tries = len(history), tries + 1
-        if k > iterations or best.judged < NOISE:
-            break
         said = f"refinement {k}/{iterations}, misfit {at.track:.3f}, on kept frames {at.judged:.3f}"
         progress(k, iterations + 1, said)
         try:
@@ -142,7 +138,7 @@ def refine(
             if breakdown.particle is not None:
                 away = np.linalg.norm(simulator.rest - simulator.rest[breakdown.particle], axis=1)
                 free *= 1 - np.exp(-((away / (STAYS * simulator.grid.spacing)) ** 2))[:, None]
-            rate *= BROKEN
+            rate *= SHORTER[1]
             continue
         if new.loss >= at.loss:
             rate *= _shorter(rate * float((slope * free * way).sum()), new.loss - at.loss)

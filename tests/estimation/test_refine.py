@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from surgisim.estimation.refine import NOISE, refine
+from surgisim.estimation.refine import refine
 from surgisim.mpm.simulator import Breakdown
 
 SOFT = -1.0
@@ -33,14 +33,12 @@ class Body:
 class Seen:
     weight = np.ones((len(Body.rest), 2, 1))
 
-    sigma = 0.03
-
     def residual(self, u, frames):
-        return (u[frames] - SOFT).swapaxes(0, 1) / self.sigma
+        return (u[frames] - SOFT).swapaxes(0, 1)
 
     def pulled_back(self, slope, u, frames):
         bar = np.zeros_like(u)
-        bar[frames] = slope.swapaxes(0, 1) / self.sigma
+        bar[frames] = slope.swapaxes(0, 1)
         return bar
 
 
@@ -64,11 +62,6 @@ def test_a_break_in_no_known_place_shortens_the_step():
     found = refined(named=False)
     assert found.theta.min() >= 0.94
     assert found.history[-1]["judged"] <= found.history[0]["judged"]
-
-
-def test_no_step_follows_what_may_be_noise():
-    rows = refined(named=True).history
-    assert all(row["judged"] > NOISE for row in rows[:-1])
 
 
 def test_every_step_that_is_kept_fits_better():
