@@ -26,6 +26,7 @@ from surgisim.estimation.damping import numerical_damping
 from surgisim.estimation.doubts import doubts, none, spreads
 from surgisim.estimation.finer import finely
 from surgisim.estimation.gauss_newton import Solution
+from surgisim.estimation.hold import ask_hold
 from surgisim.estimation.identify import identifiability, in_words
 from surgisim.estimation.lay import Laying, upright
 from surgisim.estimation.light_along_tracks import brightness, spoilt
@@ -48,7 +49,6 @@ from surgisim.estimation.refine import Refined, refine
 from surgisim.estimation.rim import seen_rim
 from surgisim.estimation.rounds import (
     INDEPENDENT,
-    ask_hold,
     at_ease,
     choose_support,
     descend,

@@ -1,4 +1,4 @@
-"""The few numbers of a clip: which support, which start, then descents over growing windows.
+"""The few numbers of a clip: which support, the shape of a pull, then descents over growing windows.
 
 The paper restarts from frame 0 for every k further frames, which costs O(n^2). Here each round's
 window is twice the last, so all rounds together cost at most twice the last one: O(n).
@@ -17,8 +17,6 @@ from surgisim.config.estimation import Estimation
 from surgisim.estimation.bearing import borne, softer
 from surgisim.estimation.gauss_newton import Solution, gauss_newton, misfit
 from surgisim.estimation.observation import PHASES
-from surgisim.estimation.pieces import Piece
-from surgisim.estimation.rim import Rim
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import MIDDLE, SHARES, edges_of
 from surgisim.estimation.trial import WORKERS, Trial, at_once
@@ -38,10 +36,6 @@ NEARER = (0.0, -1.0, 1.0)
 INERTIA = 0.005
 """Share of what a pull moves the tissue by that it may lag for its inertia, where its shape alone is asked for: at .02
 a slab held 15 mm deep is found held 13.3 mm deep, at .005 14.5 mm, at the pace of its own modulus 14.7 mm."""
-MOVED = 0.9
-"""Share of the misfit elsewhere below which a body is taken to be moved by what its edge is seen to do."""
-ONE_PIECE, IN_PIECES = ("carried edge", "hung"), ("loose piece", "parted piece")
-"""Other ways in which a body may be held, the plainer first."""
 HEATS, FINALISTS = (2, 4), 2
 """Most iterations on the shape of a pull before its release is looked at: first with every edge, then with the best."""
 FAR, LAGS = 0.95, 3
@@ -111,7 +105,7 @@ def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> 
     `settle_pull`.
     """
     wanted, start = trial.wanted, unhurried(trial, trial.wanted.start)
-    last = _driven(trial, phase)
+    last = last_driven(trial, phase)
     if not last:
         return [trial], start
     ratios = [k for k, (_, p, _) in enumerate(wanted.free) if p == "nu"]
@@ -128,88 +122,13 @@ def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> 
             x[nearer] += share * wanted.spread[nearer]
         points.append(np.clip(x, *wanted.bounds))
     say(0.03, 1.0, f"comparing {len(points)} ways the body may be held")
-    costs = at_once(partial(_cost, last=last), [(trial, x) for x in points])
+    costs = at_once(partial(cost_until, last=last), [(trial, x) for x in points])
     x = points[int(np.argmin(costs))]
     found = edges_of(wanted.depth, trial.laying.columns.spacing)
     return [replace(trial, laying=trial.laying.ending(*end)) for end in found], x
 
 
-def ask_hold(
-    trial: Trial, x: np.ndarray, begun: np.ndarray, rim: Rim | None, piece: Piece | None, phase: np.ndarray,
-    history: list, say: Say,
-) -> tuple[Trial, np.ndarray]:  # fmt: skip
-    """The trial held as what is seen of its edge and of what goes along with the grip says, and x with a pull's shape
-    fitted so, where that fits what is not seen at the edge far better; else both as they are.
-
-    It is asked once the shape has been fitted without: what else is wrong of a body is seen at its edge as well. begun:
-    where that fit began, for what cannot be simulated where it ended.
-    """
-    last = _driven(trial, phase)
-    if not last or not (rim or piece):
-        return trial, x
-    alone = _without(trial, rim) if rim else trial
-    kinds = _kinds(alone, rim, piece)
-    # What goes along may bear a firmer grip than what is held.
-    grips = sorted({1.0, trial.grip})
-    ways = {(name, grip): replace(one, grip=grip) for name, one in kinds.items() for grip in grips}
-    without, *along = at_once(partial(_cost, last=last), [(one, x) for one in (alone, *ways.values())])
-    begins = {way: (c, x) for way, c in zip(ways, along, strict=True)}
-    broken = [way for way, c in zip(ways, along, strict=True) if not np.isfinite(c)]
-    again = at_once(partial(_cost, last=last), [(ways[way], begun) for way in broken])
-    begins |= {way: (c, begun) for way, c in zip(broken, again, strict=True)}
-    for (name, grip), (c, _) in begins.items():
-        history.append({"round": "hold", "as": name, "grip": grip, "without": number(without), "cost": number(c)})
-    if min(c for c, _ in begins.values()) >= without:
-        return trial, x
-    # The shape was fitted to a body that is held: another has to be fitted before they can be compared.
-    fits = {}
-    for name in kinds:
-        grip = min(grips, key=lambda grip, name=name: begins[name, grip][0])
-        c, begin = begins[name, grip]
-        if not np.isfinite(c):
-            continue
-        best, there = settle_pull([ways[name, grip]], begin, phase, history, say)
-        cost = _cost((best, there), last=last)
-        history.append({"round": "hold", "as": name, "without": number(without), "cost": number(cost)})
-        fits[name] = cost, best, there
-    chosen, least = (trial, x), without
-    # A body in pieces has to be as much better again than one in a single piece.
-    for names in (ONE_PIECE, IN_PIECES):
-        cost, *found = min((fits[n] for n in names if n in fits), key=lambda fit: fit[0], default=(np.inf,))
-        if cost < MOVED * least:
-            chosen = tuple(found)
-        least = min(least, cost)
-    return chosen
-
-
-def _without(trial: Trial, rim: Rim) -> Trial:
-    """The trial without the points that say where the edge goes: they are no evidence that it does."""
-    observation = rim.leaves(trial.observation, trial.motion)
-    alone = replace(trial, observation=observation, laying=replace(trial.laying, observation=observation, kept={}))
-    if not trial.error:
-        return alone
-    # A point that is left out says nothing of the simulation's own error either.
-    size = np.where(observation.weight > 0, trial.error.size, 0.0)
-    return replace(alone, error=replace(trial.error, size=size, kept={}))
-
-
-def _kinds(alone: Trial, rim: Rim | None, piece: Piece | None) -> dict[str, Trial]:
-    """Other ways in which a body may be held, by name."""
-    kinds: dict[str, Trial] = {}
-    if rim:
-        kinds[ONE_PIECE[0]] = carried = replace(alone, motion=rim.carries(alone.motion))
-        # What only its edge carries ends there: beyond it nothing would.
-        kinds[ONE_PIECE[1]] = replace(carried, laying=replace(carried.laying.ending(0.0, False), base=False))
-    if piece:
-        # What goes along with a grip is carried by that alone.
-        beside = replace(alone, motion=rim.beside(piece.middles).carries(alone.motion)) if rim else alone
-        kinds[IN_PIECES[0]] = replace(beside, laying=beside.laying.parted(piece.loose, piece.walls[:0]))
-        if len(piece.walls):
-            kinds[IN_PIECES[1]] = replace(beside, laying=beside.laying.parted(piece.loose, piece.walls))
-    return kinds
-
-
-def _driven(trial: Trial, phase: np.ndarray) -> int:
+def last_driven(trial: Trial, phase: np.ndarray) -> int:
     """The last fitted frame before a release, 0 if there is none."""
     driven = trial.fitted[phase[trial.fitted] < PHASES.index("release")]
     return int(driven[-1]) if len(driven) else 0
@@ -217,14 +136,14 @@ def _driven(trial: Trial, phase: np.ndarray) -> int:
 
 def _shown(trial: Trial, phase: np.ndarray) -> int:
     """The fitted frame before a release by which every grip has gone FAR of its longest way, and LAGS more."""
-    last = _driven(trial, phase)
+    last = last_driven(trial, phase)
     way = np.linalg.norm(trial.motion.position - trial.motion.center_rest[:, None], axis=-1)[:, : last + 1]
     gone = way * trial.motion.active[:, : last + 1]
     far = (gone >= FAR * gone.max(1, keepdims=True)).argmax(1).max(initial=0)
     return int(min(last, trial.fitted[min(np.searchsorted(trial.fitted, far) + LAGS, len(trial.fitted) - 1)]))
 
 
-def _cost(job: tuple[Trial, np.ndarray], worker: int = 0, *, last: int) -> float:
+def cost_until(job: tuple[Trial, np.ndarray], worker: int = 0, *, last: int) -> float:
     """The misfit's share that counts, of a trial at x up to frame `last`; infinite where it cannot be simulated."""
     trial, x = job
     r = trial.residual(x, worker, last)

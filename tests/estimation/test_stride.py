@@ -8,7 +8,7 @@ from slab import pulled, slab
 from slab_clip import FPS, TRUE, T
 
 from surgisim.estimation.observation import phases
-from surgisim.estimation.rounds import FAR, LAGS, _driven, _shown
+from surgisim.estimation.rounds import FAR, LAGS, _shown, last_driven
 from surgisim.estimation.search import search
 from surgisim.estimation.trial import SAME, STRIDES, Trial
 from surgisim.mpm.setup import SKIN, prepare
@@ -69,6 +69,6 @@ def test_a_pull_has_shown_its_shape_once_it_has_gone_its_way(trial):
 
 def test_what_comes_after_a_release_is_no_pull(trial):
     phase = phases(trial.motion, T)
-    assert _shown(trial, phase) <= _driven(trial, phase)
+    assert _shown(trial, phase) <= last_driven(trial, phase)
     never = replace(trial, fitted=np.arange(12, T))
-    assert _shown(never, phase) == _driven(never, phase) == 0
+    assert _shown(never, phase) == last_driven(never, phase) == 0

@@ -1,0 +1,94 @@
+"""How a body is held: below and along its edge, along its edge alone, or in a piece that goes along with a grip."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from surgisim.estimation.pieces import Piece
+from surgisim.estimation.rim import Rim
+from surgisim.estimation.rounds import cost_until, last_driven, number, settle_pull
+from surgisim.estimation.trial import Trial, at_once
+
+MOVED = 0.9
+"""Share of the misfit elsewhere below which a body is taken to be moved by what its edge is seen to do."""
+ONE_PIECE, IN_PIECES = ("carried edge", "hung"), ("loose piece", "parted piece")
+"""Other ways in which a body may be held, the plainer first."""
+
+Say = Callable[[float, float, str], None]
+
+
+def ask_hold(
+    trial: Trial, x: np.ndarray, begun: np.ndarray, rim: Rim | None, piece: Piece | None, phase: np.ndarray,
+    history: list, say: Say,
+) -> tuple[Trial, np.ndarray]:  # fmt: skip
+    """The trial held as what is seen of its edge and of what goes along with the grip says, and x with a pull's shape
+    fitted so, where that fits what is not seen at the edge far better; else both as they are.
+
+    It is asked once the shape has been fitted without: what else is wrong of a body is seen at its edge as well. begun:
+    where that fit began, for what cannot be simulated where it ended.
+    """
+    last = last_driven(trial, phase)
+    if not last or not (rim or piece):
+        return trial, x
+    alone = _without(trial, rim) if rim else trial
+    kinds = _kinds(alone, rim, piece)
+    # What goes along may bear a firmer grip than what is held.
+    grips = sorted({1.0, trial.grip})
+    ways = {(name, grip): replace(one, grip=grip) for name, one in kinds.items() for grip in grips}
+    without, *along = at_once(partial(cost_until, last=last), [(one, x) for one in (alone, *ways.values())])
+    begins = {way: (c, x) for way, c in zip(ways, along, strict=True)}
+    broken = [way for way, c in zip(ways, along, strict=True) if not np.isfinite(c)]
+    again = at_once(partial(cost_until, last=last), [(ways[way], begun) for way in broken])
+    begins |= {way: (c, begun) for way, c in zip(broken, again, strict=True)}
+    for (name, grip), (c, _) in begins.items():
+        history.append({"round": "hold", "as": name, "grip": grip, "without": number(without), "cost": number(c)})
+    if min(c for c, _ in begins.values()) >= without:
+        return trial, x
+    # The shape was fitted to a body that is held: another has to be fitted before they can be compared.
+    fits = {}
+    for name in kinds:
+        grip = min(grips, key=lambda grip, name=name: begins[name, grip][0])
+        c, begin = begins[name, grip]
+        if not np.isfinite(c):
+            continue
+        best, there = settle_pull([ways[name, grip]], begin, phase, history, say)
+        cost = cost_until((best, there), last=last)
+        history.append({"round": "hold", "as": name, "without": number(without), "cost": number(cost)})
+        fits[name] = cost, best, there
+    chosen, least = (trial, x), without
+    # A body in pieces has to be as much better again than one in a single piece.
+    for names in (ONE_PIECE, IN_PIECES):
+        cost, *found = min((fits[n] for n in names if n in fits), key=lambda fit: fit[0], default=(np.inf,))
+        if cost < MOVED * least:
+            chosen = tuple(found)
+        least = min(least, cost)
+    return chosen
+
+
+def _without(trial: Trial, rim: Rim) -> Trial:
+    """The trial without the points that say where the edge goes: they are no evidence that it does."""
+    observation = rim.leaves(trial.observation, trial.motion)
+    alone = replace(trial, observation=observation, laying=replace(trial.laying, observation=observation, kept={}))
+    if not trial.error:
+        return alone
+    # A point that is left out says nothing of the simulation's own error either.
+    size = np.where(observation.weight > 0, trial.error.size, 0.0)
+    return replace(alone, error=replace(trial.error, size=size, kept={}))
+
+
+def _kinds(alone: Trial, rim: Rim | None, piece: Piece | None) -> dict[str, Trial]:
+    """Other ways in which a body may be held, by name."""
+    kinds: dict[str, Trial] = {}
+    if rim:
+        kinds[ONE_PIECE[0]] = carried = replace(alone, motion=rim.carries(alone.motion))
+        # What only its edge carries ends there: beyond it nothing would.
+        kinds[ONE_PIECE[1]] = replace(carried, laying=replace(carried.laying.ending(0.0, False), base=False))
+    if piece:
+        # What goes along with a grip is carried by that alone.
+        beside = replace(alone, motion=rim.beside(piece.middles).carries(alone.motion)) if rim else alone
+        kinds[IN_PIECES[0]] = replace(beside, laying=beside.laying.parted(piece.loose, piece.walls[:0]))
+        if len(piece.walls):
+            kinds[IN_PIECES[1]] = replace(beside, laying=beside.laying.parted(piece.loose, piece.walls))
+    return kinds
