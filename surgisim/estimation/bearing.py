@@ -22,15 +22,15 @@ TOO_VIOLENT = (
 
 
 def borne(trial: Trial, x: np.ndarray, history: list, last: int | None = None) -> tuple[Trial, Run]:
-    """The trial with the firmest hold, not firmer than its own, that can be simulated at x, and the run of it: of the
-    whole clip, or of what a misfit up to frame `last` asks for.
+    """The trial with the firmest hold, not firmer than its own, that can be simulated at x, at the longest step that it
+    bears there, and the run of it at the stable one: of the whole clip, or of what a misfit up to frame `last` asks.
 
     Tracks at the jaws are the worst there are, and a firm grip that follows them can turn the tissue inside
     out; a softer one lets it slip. Raises Problem when even the softest does not help.
     """
     while True:
         try:
-            return trial, trial.run(x, last=None if last is None else trial.until(last))
+            return trial.striding(x, last)
         except Breakdown as breakdown:
             trial = softer(trial, x, history, breakdown)
 

@@ -11,7 +11,7 @@ from surgisim.estimation.rounds import number, plain
 from surgisim.estimation.trial import WORKERS, Trial
 from surgisim.mpm.simulator import Breakdown
 
-FINER, NEARLY = 1.5, 1e-3
+FINER, NEARLY = 1.5, 2e-3
 """How many times finer the grid is that a fit ends on, and the share of its cost that a step must win there at last."""
 BROKE = "what fits on the wider grid cannot be simulated on a finer one"
 """What `history` says where a fit stays on the wider grid."""
@@ -44,6 +44,6 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
         history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
         return trial, solution
     here = Solution(found.x, found.residual, np.where(wanted.paces, own, found.jacobian))
-    found = settled(Otherwise("finer grid", alone, begin=found.x), here, enough=NEARLY)
+    found = settled(Otherwise("finer grid", alone, begin=found.x, residual=found.residual), here, enough=NEARLY)
     history.append({"round": "finer grid", "cost": number(found.cost)} | plain(wanted, found.x))
     return fine, replace(here, x=found.x, residual=found.residual)

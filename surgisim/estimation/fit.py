@@ -61,10 +61,11 @@ from surgisim.estimation.search import PACE, search
 from surgisim.estimation.starts import choose_starts
 from surgisim.estimation.stated import by_phase
 from surgisim.estimation.support import EDGES, Support, open_depth
-from surgisim.estimation.trial import WORKERS, Trial
+from surgisim.estimation.trial import SAFETY, WORKERS, Trial
 from surgisim.estimation.written import physics_of, unfitted
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
+from surgisim.mpm.simulator import Run
 from surgisim.physics.catalogue import choose, columns
 from surgisim.physics.place import Place
 from surgisim.problem import Problem
@@ -157,7 +158,6 @@ def estimate(
     x, history, table = trial.wanted.start, [], {}
     progress = _onward(progress)
     trial, run = borne(trial, x, history)
-    trial = trial.striding(x)
     default, edges = trial.stand(x)[0].observation, [trial]
     if trial.laying:
         edges, x = choose_support(trial, phase, history, progress)
@@ -427,11 +427,17 @@ def _refined(
     # What is simulated at another pace has its limits there as well.
     slower = np.exp([PACE.get(p.unit, 0.0) * eased for p in ends])
 
-    def path(theta: np.ndarray) -> Drive:
-        return trial.drive(values, frames=int(fitted[-1]) + 1, stiffest=prepared.stiffest(theta))
+    def simulated(theta: np.ndarray) -> tuple[Drive, Run]:
+        rows, frames = prepared.stiffest(theta), int(fitted[-1]) + 1
+
+        def at(stride: float) -> tuple[Drive, Run]:
+            path = trial.drive(values, frames=frames, stiffest=rows, safety=SAFETY * stride)
+            return path, prepared.simulator.run(theta, path)
+
+        return trial.strided(at)
 
     refined = refine(
-        prepared.simulator, path, theta, chosen, trial.observation, train=train, judge=judge, image=image,
+        prepared.simulator, simulated, theta, chosen, trial.observation, train=train, judge=judge, image=image,
         image_weight=settings.image_weight, iterations=settings.field_iterations, smoothness=settings.smoothness,
         limits=(slower * [p.low for p in ends], slower * [p.high for p in ends]),
         progress=lambda done, of, text: progress(0.8 + 0.15 * done / of, 1.0, text),

@@ -81,6 +81,8 @@ class Otherwise:
     """Which numbers are fitted anew, (M,) bool; all if None."""
     part: float = 1.0
     """Standard deviations by which it is changed, where it does not compete."""
+    residual: np.ndarray | None = None
+    """Weighted, where it begins, (R,); None where that is not known yet."""
     changed_by: Callable[[float], "Otherwise"] | None = None
     """The same changed by another part; None where there is but one way."""
 
@@ -289,7 +291,7 @@ def settled(
     """
     trial, wanted, J = one.trial, one.trial.wanted, solution.jacobian
     x = solution.x if one.begin is None else one.begin
-    r = trial.residual(x, worker)
+    r = trial.residual(x, worker) if one.residual is None else one.residual
     if r is None:
         return Answer(one, x, r, np.inf, J)
     cost, damping, gained = cost_of(r, x, wanted), 0.01, np.inf

@@ -70,7 +70,7 @@ class _Tried:
 
 def refine(
     simulator: Simulator,
-    drive: Callable[[np.ndarray], Drive],
+    simulated: Callable[[np.ndarray], tuple[Drive, Run]],
     theta: np.ndarray,
     columns: list[int],
     observation: Observation,
@@ -87,7 +87,7 @@ def refine(
 ) -> Refined:
     """Improve `columns` of theta (P, M) on frames `train`, and keep the best only if `judge` improves.
 
-    drive: what carries the tissue, at a step that is stable for a theta.
+    simulated: what carries the tissue, at a step that a theta bears, and the run of it.
     image: from u (T, A, 3) to the image misfit and its derivative (T, A, 3), or None.
     limits: lowest and highest value of every column, (M,) each.
     """
@@ -102,8 +102,7 @@ def refine(
 
     def tried(s: np.ndarray) -> _Tried:
         now = field(s)
-        path = drive(now)
-        run = simulator.run(now, path)
+        path, run = simulated(now)
         track, u_bar = _track_loss(observation, run.u, train)
         picture = 0.0
         if image is not None and image_weight > 0:

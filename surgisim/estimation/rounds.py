@@ -239,8 +239,7 @@ def descend(
     wanted = trial.wanted
     for k, last in enumerate(ends):
         # What fits a window may turn the tissue inside out in the next.
-        trial, _ = borne(trial, x, history, last)
-        trial, solution = trial.striding(x, last), None
+        (trial, _), solution = borne(trial, x, history, last), None
         while solution is None:
 
             def said(iteration, now, cost, k=k, last=last):

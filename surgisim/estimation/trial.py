@@ -22,6 +22,7 @@ from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.physics.catalogue import choose
+from surgisim.problem import Problem
 
 WORKERS = 2
 SAFETY = 0.9
@@ -166,7 +167,7 @@ class Trial:
         return np.concatenate([r, light.residual(u, frames).ravel()]) if light else r
 
     def _run(self, x: np.ndarray, worker: int, last: int | None) -> tuple[Run, Observation]:
-        return self._striding(lambda stride: self._at_stride(stride, x, worker, last))
+        return self.strided(lambda stride: self._at_stride(stride, x, worker, last))
 
     def _at_stride(self, stride: float, x: np.ndarray, worker: int, last: int | None) -> tuple[Run, Observation]:
         values = self.values(x)
@@ -176,42 +177,51 @@ class Trial:
         run = here.bodies[worker].simulator.run(here.theta(values), drive, first=first, last=last)
         return run.after(first), here.observation
 
-    def _striding(self, run: Callable[[float], Any]) -> Any:
-        """run(stride) at this trial's, or at the stable step where it breaks down."""
+    def strided(self, run: Callable[[float], Any]) -> Any:
+        """run(stride) at this trial's, or at the stable step where that is too long."""
         if self.stride > 1.0:
-            with suppress(Breakdown):
+            with suppress(Problem):
                 return run(self.stride)
         return run(1.0)
 
-    def striding(self, x: np.ndarray, last: int | None = None) -> Self:
-        """This trial with the longest of STRIDES at which its run at x, up to frame `last`, is the same."""
+    def striding(self, x: np.ndarray, last: int | None = None) -> tuple[Self, Run]:
+        """This trial with the longest of STRIDES at which its run at x, up to frame `last`, is the same, and the run of
+        it at the stable step; raises Breakdown where that cannot be simulated."""
         until = None if last is None else self.until(last)
-        stable = self._at_stride(1.0, x, 0, until)[0].u
-        for stride in STRIDES:
-            with suppress(Breakdown):
-                u = self._at_stride(stride, x, 0, until)[0].u
-                if np.linalg.norm(u - stable) <= SAME * np.linalg.norm(stable):
-                    return replace(self, stride=stride)
-        return replace(self, stride=1.0)
+
+        def at(stride: float, worker: int) -> Run | Problem:
+            try:
+                return self._at_stride(stride, x, worker, until)[0]
+            except Problem as problem:
+                return problem
+
+        def same(run: Run | Problem) -> bool:
+            return isinstance(run, Run) and np.linalg.norm(run.u - stable.u) <= SAME * np.linalg.norm(stable.u)
+
+        longest, *others = STRIDES
+        stable, run = at_once(at, [1.0, longest], min(WORKERS, len(self.bodies)))
+        if isinstance(stable, Problem):
+            raise stable
+        if same(run):
+            return replace(self, stride=longest), stable
+        kept = next((stride for stride in others if same(at(stride, 0))), 1.0)
+        return replace(self, stride=kept), stable
 
     def closely(
-        self, x: np.ndarray, since: int, last: int, within: int, worker: int = 0
-    ) -> tuple[np.ndarray, np.ndarray, Observation]:
-        """Nodal displacements at x up to frame `since`, those from it to frame `last` at `within` states a frame [m],
-        and what they are compared with."""
-        values = self.values(x)
+        self, x: np.ndarray, pull: Run, last: int, within: int, worker: int = 0
+    ) -> tuple[np.ndarray, Observation]:
+        """Nodal displacements at x from the last frame of `pull`, which began at rest, to frame `last`, at `within`
+        states a frame [m], (., A, 3), and what they are compared with."""
+        values, since = self.values(x), len(pull.u) - 1
         here, motion = self.stand(x, worker)
-        simulator, theta, first = here.bodies[worker].simulator, here.theta(values), min(self.quiet, since)
+        simulator, theta = here.bodies[worker].simulator, here.theta(values)
 
-        def run(stride: float) -> tuple[np.ndarray, np.ndarray]:
-            steps = within * math.ceil(here.per_frame(values, safety=SAFETY * stride) / within)
-            drive = here.drive(values, per_frame=steps, motion=motion)
-            before = simulator.run(theta, drive, first=first, last=since)
-            closer = replace(drive, per_frame=steps // within)
-            after = simulator.run(theta, closer, begin=before.state(-1), first=since * within, last=last * within)
-            return before.after(first).u, after.u
+        def run(stride: float) -> np.ndarray:
+            steps = math.ceil(here.per_frame(values, safety=SAFETY * stride) / within)
+            closer = replace(here.drive(values, per_frame=within * steps, motion=motion), per_frame=steps)
+            return simulator.run(theta, closer, begin=pull.state(-1), first=since * within, last=last * within).u
 
-        return *self._striding(run), here.observation
+        return self.strided(run), here.observation
 
     @cached_property
     def calm(self) -> bool:

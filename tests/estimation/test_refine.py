@@ -43,10 +43,11 @@ class Seen:
 
 
 def refined(named: bool):
-    start = np.ones((len(Body.rest), 1))
+    body, start = Body(named), np.ones((len(Body.rest), 1))
     return refine(
-        Body(named), lambda theta: None, start, [0], Seen(), train=np.array([0]), judge=np.array([1]), image=None,
-        image_weight=0.0, iterations=40, smoothness=0.0, limits=(np.array([1e-3]), np.array([1e3])),
+        body, lambda theta: (None, body.run(theta, None)), start, [0], Seen(),
+        train=np.array([0]), judge=np.array([1]), image=None, image_weight=0.0,
+        iterations=40, smoothness=0.0, limits=(np.array([1e-3]), np.array([1e3])),
     )  # fmt: skip
 
 

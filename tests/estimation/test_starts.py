@@ -10,9 +10,11 @@ from surgisim.estimation import rounds
 from surgisim.estimation.search import search
 from surgisim.estimation.starts import (
     DAMPING,
+    READ,
     SOFTER,
     WITHIN,
     Freed,
+    _likely,
     _of_each_valley,
     at_pace,
     choose_starts,
@@ -76,6 +78,12 @@ def test_of_every_valley_one_start_comes_before_seconds_of_any():
     assert len(first) == 2
     assert wanted.log_modulus_ratio(at[0], at[1]) == pytest.approx(0.1)
     assert wanted.log_modulus_ratio(at[2], at[0]) == pytest.approx(2.0)
+
+
+def test_what_reads_far_worse_than_the_best_is_not_simulated():
+    costs = [2.0, 1.0, READ, 1.01 * READ, np.inf]
+    assert [c for c, _ in _likely((c, np.zeros(1)) for c in costs)] == [1.0, READ]
+    assert _likely([]) == []
 
 
 def test_a_damping_between_those_that_were_read_is_found():
