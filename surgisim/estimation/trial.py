@@ -126,20 +126,13 @@ class Trial:
         return self._run(x, worker, last)[0]
 
     def residual(self, x: np.ndarray, worker: int = 0, last: int | None = None) -> np.ndarray | None:
-        """Weighted misfit on fitted frames up to `last`, flat, tracks first; None where x cannot be simulated.
-
-        With all of the fitted frames what comes after them must be borne as well.
-        """
+        """Weighted misfit on fitted frames up to `last`, flat, tracks first; None where x breaks down."""
         last = int(self.fitted[-1]) if last is None else last
         try:
-            run, observation = self._run(x, worker, self.until(last))
+            run, observation = self._run(x, worker, last)
         except Breakdown:
             return None
         return self.judged(run.u, observation, last)
-
-    def until(self, last: int) -> int:
-        """The frame up to which a run goes whose misfit is wanted up to `last`."""
-        return last if last < self.fitted[-1] else self.frames - 1
 
     def of_frames(self, each: np.ndarray) -> np.ndarray:
         """What each residual's frame has of `each`, (T,), in the order of `residual`, (R,)."""
@@ -186,8 +179,11 @@ class Trial:
 
     def striding(self, x: np.ndarray, last: int | None = None) -> tuple[Self, Run]:
         """This trial with the longest of STRIDES at which its run at x, up to frame `last`, is the same, and the run of
-        it at the stable step; raises Breakdown where that cannot be simulated."""
-        until = None if last is None else self.until(last)
+        it at the stable step; raises Breakdown where that cannot be simulated.
+
+        With all of the fitted frames what comes after them must be borne as well.
+        """
+        until = last if last is not None and last < self.fitted[-1] else None
 
         def at(stride: float, worker: int) -> Run | Problem:
             try:
@@ -247,7 +243,7 @@ class Trial:
         most = max(self.per_frame(v) for v in values)
         motions = [self.wanted.motion(x, self.motion) for x in points]
         drives = [self.drive(v, per_frame=most, motion=m) for v, m in zip(values, motions, strict=True)]
-        runs = self.batch.run([self.theta(v) for v in values], drives, last=self.until(last))
+        runs = self.batch.run([self.theta(v) for v in values], drives, last=last)
         return [None if isinstance(run, Breakdown) else self.judged(run.u, self.observation, last) for run in runs]
 
     @cached_property

@@ -73,3 +73,20 @@ def test_what_comes_after_a_release_is_no_pull(trial):
     assert _shown(trial, phase) <= last_driven(trial, phase)
     never = replace(trial, fitted=np.arange(12, T))
     assert _shown(never, phase) == last_driven(never, phase) == 0
+
+
+def test_a_misfit_asks_for_no_frame_after_those_it_compares_but_a_step_bears_the_whole_clip(trial, monkeypatch):
+    seen, until, at = replace(trial, fitted=np.arange(1, 9)), [], Trial._at_stride
+
+    def run(self, stride, x, worker, last):
+        until.append(last)
+        return at(self, stride, x, worker, last)
+
+    monkeypatch.setattr(Trial, "_at_stride", run)
+    monkeypatch.setattr(Trial, "judged", lambda self, u, observation, last: u)
+    x = trial.wanted.start
+    assert len(seen.residual(x)) == 9
+    assert len(seen.residual(x, last=4)) == 5
+    assert len(seen.striding(x, last=8)[1].u) == T
+    assert len(seen.striding(x, last=4)[1].u) == 5
+    assert until == [8, 4, None, None, 4, 4]
