@@ -12,8 +12,8 @@ does but not with the angle. What is turned away from the lamp gets that share o
 import numpy as np
 
 MATTE = 0.7
-"""Share of tissue's light that follows the angle, 1 - a: what is expected where it is not fitted. Tried against .85 on
-twelve clips of family 8086 in depth's change: 56 % off for 61."""
+"""How far the brightness of tissue follows the angle, against a wholly matte surface without other light: what is
+expected where it is not fitted. Tried against .85 on twelve clips of family 8086 in depth's change: 56 % off for 61."""
 
 
 def facing(points: np.ndarray, normals: np.ndarray) -> np.ndarray:

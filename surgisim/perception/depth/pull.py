@@ -29,9 +29,8 @@ NEAR = 0.1
 """Spread of the held ball's centre, each way, about where most motion is seen, as a share of the distance."""
 TILT = 0.1
 """Spread of the slope of the whole surface, each way, about that which frame 0's brightness suggests."""
-MATTE_SPREAD, DARKEST = 0.15, 0.05
-"""Spread of the share of light that follows the angle, about what is expected of it; least of what faces the lamp that
-is still lit when it is turned away."""
+MATTE_SPREAD = 0.15
+"""Spread of how far brightness follows the angle, about what is expected of it."""
 ACROSS, SHAPE, FAR = 0.15, 0.12, 0.25
 """Errors of the motion across the view: of the tracking [px of the lattice], and of the layer's as shares of the motion
 nearby and of the largest motion."""
@@ -347,7 +346,7 @@ def _compared(scene: _Scene, tissue: np.ndarray, moved: np.ndarray, matte: float
     """Weighted differences, simulated less seen, of motion across the view and of brightness, (3 K,)."""
     across = _across(scene, moved)
     shape = scene.lattice.shape
-    light = _brightness(tissue + moved, shape, matte) - _brightness(tissue, shape, matte) - scene.brighter
+    light = matte * (_brightness(tissue + moved, shape) - _brightness(tissue, shape)) - scene.brighter
     rest = np.concatenate([(across * scene.weight_across[:, None]).ravel(), light * scene.weight_light])
     return _less_far(rest, ROBUST / np.sqrt(ALIKE))
 
@@ -363,13 +362,13 @@ def _across(scene: _Scene, moved: np.ndarray) -> np.ndarray:
     return moved[:, :2] - scene.ray * moved[:, 2:] - scene.across
 
 
-def _brightness(points: np.ndarray, shape: tuple[int, int], matte: float) -> np.ndarray:
-    """log (1 - matte + matte cos theta) / d^2 of a surface of lattice points (K, 3), (K,): lighting/headlight.py."""
+def _brightness(points: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """log cos(theta) / d^2 of a surface of lattice points (K, 3), (K,)."""
     grid = points.reshape(*shape, 3)
     normal = np.cross(np.gradient(grid, axis=1), np.gradient(grid, axis=0))
     away = np.linalg.norm(grid, axis=-1)
     facing = np.abs((normal * grid).sum(-1)) / np.maximum(np.linalg.norm(normal, axis=-1) * away, 1e-12)
-    return (np.log(np.maximum(1 - matte * (1 - facing), DARKEST)) - 2 * np.log(away)).ravel()
+    return (np.log(np.maximum(facing, 0.05)) - 2 * np.log(away)).ravel()
 
 
 def _least_squares(
