@@ -188,10 +188,13 @@ def estimate(
             trial, solution = finely(trial, solution, history, _part(progress, 0.7, 0.8))
             shift = solution.x - wide_x
             table = _known(trial, solution, model | {"grid": np.outer(shift, shift)}, phase, settings)
+        finer = trial is not wide
+        # What fits may yet turn the tissue inside out in the frames after those that were compared.
+        wide, _ = borne(wide, wide_x, history)
         unsure = doubts(wide, wide_x, spreads(wide.wanted, table), open_beside, tracks, camera)
         x = solution.x
     else:
-        wide, wide_x = trial, x
+        wide, wide_x, finer = trial, x, False
         unsure = none(tracks)
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
     loose = trial.laying.loose if trial.laying else 0.0
@@ -204,7 +207,7 @@ def estimate(
     coarse, uniform = alone(wide.settled(wide_x)), wide.values(wide_x)
     if settings.enabled:
         coarse, _ = handed_on(coarse, uniform, coarse.theta(uniform), history)
-    values, finer = trial.wanted.values(x), trial is not wide
+    values = trial.wanted.values(x)
     trial = alone(trial.settled(x)) if finer else coarse
     if finer:
         edge_kept = {"rim": coarse.motion.rim, "rim_radius": coarse.motion.rim_radius}
