@@ -12,7 +12,8 @@ from surgisim.estimation.trial import WORKERS, Trial
 from surgisim.mpm.simulator import Breakdown
 
 FINER, NEARLY = 1.5, 2e-3
-"""How many times finer the grid is that a fit ends on, and the share of its cost that a step must win there at last."""
+"""How many times finer the grid is that a fit ends on, and the share of its cost that a step must win there at last;
+the latter chosen on the embedded clip, whose last steps win .3, .1, .1 and .4 % and make E 2.4 % lower together."""
 BROKE = "what fits on the wider grid cannot be simulated on a finer one"
 """What `history` says where a fit stays on the wider grid."""
 
