@@ -53,8 +53,9 @@ class Estimation(Settings):
     sees twice as many [-]."""
     field: list[str] = ["corotated.E", "newtonian.eta"]
     """'law.parameter' entries refined per particle, where that pays on frames kept from the refinement [-]."""
-    field_iterations: int = Field(12, ge=0, le=200)
-    """Adjoint iterations of the per-particle refinement; 0 leaves parameters uniform [-]."""
+    field_iterations: int = Field(24, ge=0, le=200)
+    """Adjoint iterations of the per-particle refinement at most, which ends where they no longer pay; 0 leaves
+    parameters uniform [-]."""
     smoothness: float = Field(3.0, ge=0)
     """Weight of the total variation of per-particle parameters, against the data's misfit [-]."""
     image_weight: float = Field(0.5, ge=0)

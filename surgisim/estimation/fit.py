@@ -217,7 +217,9 @@ def estimate(
         # A field shapes what is slow, which the wider grid shows as well, at a fifth of the cost.
         field, refined = _refined(coarse, uniform, wide.eased or 0.0, scene, frames, masks, camera, settings, progress)
         theta = _brought(field, coarse, uniform, trial, values)
-    trial, run = handed_on(trial, values, theta, history)
+    # What nothing tells the pace of takes the same shapes in longer steps.
+    there = trial.wanted.values(trial.wanted.paced(x, wide.eased or 0.0))
+    trial, run = handed_on(trial, there, _brought(theta, trial, values, trial, there), history)
     prepared, laid = trial.bodies[0], trial.bodies[0].body
     support = Support(depth, *edge, len(trial.motion.rim), loose, bool(len(laid.torn)))
     path = trial.drive(values, stiffest=prepared.stiffest(theta))

@@ -38,8 +38,8 @@ FIRMEST = 8.0
 every step of every run after it shorter."""
 TRIES = 3
 """Steps tried, at most, for each that may be kept."""
-PATIENCE = 3
-"""Better fits in a row that do not fit the kept frames better after which no more are sought."""
+PAYS, OVER = 0.04, 3
+"""Share of the kept frames' misfit that so many steps together must take off, or no more are sought; chosen."""
 
 
 @dataclass(frozen=True)
@@ -125,8 +125,8 @@ def refine(
     history = [_row(0, at)]
     free = np.ones((len(theta), 1))
     slope, past = slope_at(at), _Past(partial(_smoothed, pairs=pairs))
-    way, rate, patience, tries = past.way(slope, free), 1.0, PATIENCE, 0
-    while patience and len(history) <= iterations and rate * _size(free * way) >= LEAST and tries < TRIES * iterations:
+    way, rate, tries, pays = past.way(slope, free), 1.0, 0, True
+    while pays and len(history) <= iterations and rate * _size(free * way) >= LEAST and tries < TRIES * iterations:
         k, tries = len(history), tries + 1
         said = f"refinement {k}/{iterations}, misfit {at.track:.3f}, on kept frames {at.judged:.3f}"
         progress(k, iterations + 1, said)
@@ -145,8 +145,9 @@ def refine(
         before, steeper = at, slope
         at = new
         history.append(_row(k, at))
-        best, patience = (at, PATIENCE) if at.judged < best.judged else (best, patience - 1)
-        if patience and k < iterations:
+        best = min(best, at, key=lambda one: one.judged)
+        pays = k < OVER or best.judged <= (1 - PAYS) * min(row["judged"] for row in history[:-OVER])
+        if pays and k < iterations:
             slope = slope_at(at)
             past.met(at.s - before.s, slope - steeper)
             way, rate = past.way(slope, free), 1.0
