@@ -1,12 +1,13 @@
 """Put a clip that went through the graph into a recording folder, for the diagnosis.
 
-reads   body.npz, material.npz, physics.json, tracks.npz, motion.npz, frames.npz, camera.json, doubts.npz
+reads   body.npz, material.npz, physics.json, tracks.npz, motion.npz, frames.npz, camera.json, doubts.npz, fit.json
 writes  recording.json, rest.ply, fixed.json, grip.npz, tracks.npz, split.json
 """
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.doubts import Doubts
+from surgisim.artifacts.fit import Fit
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.material import Material
 from surgisim.artifacts.motion import Motion
@@ -25,6 +26,7 @@ READS = {
     "frames": Frames,
     "camera": Camera,
     "doubts": Doubts,
+    "fit": Fit,
 }
 
 

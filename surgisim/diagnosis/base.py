@@ -11,6 +11,7 @@ import numpy as np
 from surgisim.diagnosis import calibration
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.prior import SPREAD, START, Prior
 from surgisim.diagnosis.tangent import Tangent
 from surgisim.mpm.closing import follow
 from surgisim.mpm.grip import Drive
@@ -19,9 +20,6 @@ from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.problem import Problem
 
 TERMS = ("neo_hookean_ciarlet", "newtonian")
-START = np.array([np.log(5e3), 0.45, np.log(2e-3)])
-"""log E [Pa], nu, log eta / E [s]: soft tissue and silicone gels lie between 1 and 50 kPa and .3 and 20 ms."""
-SPREAD = np.array([1.2, 0.03, 1.4])
 LOW, HIGH = np.array([np.log(2e2), 0.30, np.log(5e-5)]), np.array([np.log(1e6), 0.49, np.log(5e-2)])
 NAMES = ("E", "nu", "eta / E")
 INCOMPRESSIBLE = 0.5
@@ -58,11 +56,14 @@ class Known:
         """Standard deviation, (3,)."""
         return np.sqrt(np.diag(self.near) + (self.aside**2).mean(0))
 
-    def beside(self, left: float) -> "Known":
-        """The same where a law that nobody knows leaves so much chi square: its share of that is the numbers' too."""
-        surer, prior = np.linalg.inv(self.near), np.diag(SPREAD**-2)
+    def beside(self, left: float, prior: Prior) -> "Known":
+        """The same where a law that nobody knows leaves so much chi square: its share of that is the numbers' too.
+
+        prior: what was known of them beforehand.
+        """
+        surer, before = np.linalg.inv(self.near), np.diag(prior.spread**-2)
         less = calibration.ALIKE_ERRORS / calibration.temperature(calibration.ALIKE_ERRORS, left)
-        return replace(self, near=np.linalg.inv(less * (surer - prior) + prior))
+        return replace(self, near=np.linalg.inv(less * (surer - before) + before))
 
     def draws(self, x: np.ndarray) -> np.ndarray:
         """Numbers that would do, none of them incompressible or beyond, (at most D, 3)."""

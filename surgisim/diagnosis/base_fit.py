@@ -13,8 +13,6 @@ import numpy as np
 
 from surgisim.diagnosis import calibration
 from surgisim.diagnosis.base import (
-    SPREAD,
-    START,
     TERMS,
     Base,
     Known,
@@ -152,7 +150,7 @@ def fit_base(
     begun: a base of nearly the same body.
     """
     late = [float(clip.opening[j, t]) for j, t in clip.releases()] if timing else []
-    y, promised, ends = np.concatenate([START if begun is None else begun.x, late]), np.inf, []
+    y, promised, ends = np.concatenate([clip.prior.middle if begun is None else begun.x, late]), np.inf, []
     others = np.zeros((DRAWS, 3)) if begun is None else begun.known.aside
     laid = Laid.on(clip, workers)
     fine = None if finer is None else Laid.on(clip.laid(share=finer), workers)
@@ -184,7 +182,7 @@ def fit_base(
         promised = around.cost(y, around.left(y))
     slopes = around.slopes(y)
     known = Known(np.linalg.inv(around.normal(slopes))[:3, :3], others)
-    units = slopes[:3] * SPREAD[:, None, None, None]
+    units = slopes[:3] * clip.prior.spread[:, None, None, None]
     clip = ran.clip.less(None if ran.finer is laid else ran.error)
     bound = at_bound(ran.x, clip)
     return clip, Base(ran.x, laid.bodies[0], ran.drive, ran.run, ran.simulated, near, units, known, bound), ran.finer
@@ -266,7 +264,7 @@ def without(case, response: np.ndarray, say: Callable[[str], None]) -> list[Desc
     bodies = [base.prepared, *(clip.prepared(TERMS) for _ in range(case.workers - 1))]
     around = RingDown(
         rest, case.whiten, case.beside_base, case.memo, bodies, base.prepared.simulator.carry(clip.rest),
-        np.concatenate([base.x, late]), base.run, base.simulated[:, :until], base.slopes[1] / SPREAD[1],
+        np.concatenate([base.x, late]), base.run, base.simulated[:, :until], base.slopes[1] / clip.prior.spread[1],
     )  # fmt: skip
     return around.descents(say)
 
@@ -279,7 +277,7 @@ def settled(
     fine: the grid that it is fitted on; space: with the base's own slopes in columns `slopes`, each at a prior standard
     deviation.
     """
-    until, x = clip.until, base.x
+    until, x, spread = clip.until, base.x, clip.prior.spread
     observed = clip.less(None).moved[:, :until]
 
     def misfit(there: np.ndarray) -> tuple[float, np.ndarray]:
@@ -289,8 +287,8 @@ def settled(
     plain = base.simulated if clip.error is None else base.simulated + clip.error
     least, likely = misfit(plain)
     for _ in range(NEWTONS):
-        tried = bounded(x + np.clip(likely, -1, 1) * SPREAD, clip)
-        found = None if np.abs((tried - x) / SPREAD).max() < SETTLED else _ran(fine, tried, memo)
+        tried = bounded(x + np.clip(likely, -1, 1) * spread, clip)
+        found = None if np.abs((tried - x) / spread).max() < SETTLED else _ran(fine, tried, memo)
         if found is None:
             break
         cost, likely = misfit(found[2])
@@ -305,7 +303,7 @@ def settled(
         clip = clip.less(None if clip.error is None else plain - simulated)
     open_to = np.linalg.inv(np.eye(space.columns.shape[1]) + (space.columns.T @ space.columns).astype(float))
     told = (np.linalg.inv(open_to[slopes, slopes]) - np.eye(3)) / calibration.ALIKE_ERRORS
-    near = np.linalg.inv(np.eye(3) + told) * np.outer(SPREAD, SPREAD) + softness(clip)
+    near = np.linalg.inv(np.eye(3) + told) * np.outer(spread, spread) + softness(clip)
     return clip, replace(base, known=replace(base.known, near=near), bound=at_bound(x, clip))
 
 

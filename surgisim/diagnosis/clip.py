@@ -6,6 +6,7 @@ import numpy as np
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.motion import Motion
+from surgisim.diagnosis.prior import Prior, prior_of
 from surgisim.estimation.rim import Rim
 from surgisim.mpm.grip import runs
 from surgisim.mpm.setup import Prepared, prepare
@@ -79,6 +80,11 @@ class Clip:
         directions, (K, 3, 3); None for what it does not say."""
         mine = self.recording.of(self.kept)
         return mine.sigma, mine.axes, mine.ways
+
+    @property
+    def prior(self) -> Prior:
+        """Of the base's numbers."""
+        return prior_of(self.recording)
 
     @property
     def motion(self) -> Motion:

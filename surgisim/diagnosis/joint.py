@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.diagnosis import calibration
-from surgisim.diagnosis.base import SPREAD, Base, bounded, carried, simulate
+from surgisim.diagnosis.base import Base, bounded, carried, simulate
 from surgisim.diagnosis.laws import IMPOSSIBLE, Clash, joined, law_of, respond
 from surgisim.diagnosis.refine import refined
 
@@ -122,7 +122,7 @@ def _moved(case, refits: list) -> list[Joint]:
     left = case.z - sum(case.whiten(r.response[:, :until]) for r in refits)
     likely = case.space.likely(left)[case.slopes]
     x = base.x if first is None else first
-    x = np.concatenate([bounded(x[:3] + likely * SPREAD, clip), x[3:]])
+    x = np.concatenate([bounded(x[:3] + likely * clip.prior.spread, clip), x[3:]])
     try:
         moved = based(case, x)
         simulated = moved.simulated

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surgisim.diagnosis import calibration, candidates
-from surgisim.diagnosis.base import SPREAD, START, Known, bounded, softness
+from surgisim.diagnosis.base import Known, bounded, softness
 from surgisim.diagnosis.clip import OPENS
 from surgisim.diagnosis.knobs import Start, turned
 from surgisim.diagnosis.laws import IMPOSSIBLE, Law, beside, joined, law_of, respond
@@ -63,7 +63,8 @@ def refined(
     space = case.beside_base
     shown = clip.releases() if "release" not in case.settings.without else []
     late = np.array([clip.opening[j, t] for j, t in shown])
-    start, reach = np.concatenate([base.x, late]), np.concatenate([SPREAD, np.full(len(late), LATE)])
+    middle, spread = clip.prior.middle, clip.prior.spread
+    start, reach = np.concatenate([base.x, late]), np.concatenate([spread, np.full(len(late), LATE)])
 
     def base_of(x: np.ndarray) -> np.ndarray:
         there = start + x[own:] * reach
@@ -95,9 +96,9 @@ def refined(
 
     likely = case.space.likely(z - whiten(response[:, :until]))[case.slopes]
     likely = np.concatenate([np.clip(likely, -2, 2), 0 * late])
-    usual = (np.concatenate([[START[0], base.x[1], START[2]], 0 * late + OPENS]) - start) / reach
+    usual = (np.concatenate([[middle[0], base.x[1], middle[2]], 0 * late + OPENS]) - start) / reach
     # Each law's numbers have a prior around where they begin, the base's around what tissue is.
-    prior = np.concatenate([np.zeros(own), (np.concatenate([START, 0 * late + OPENS]) - start) / reach])
+    prior = np.concatenate([np.zeros(own), (np.concatenate([middle, 0 * late + OPENS]) - start) / reach])
     bases = [0 * usual, likely, usual, *((at - start) / reach for at in bases_at)]
     begins = [np.concatenate([np.zeros(own), by]) for by in bases]
     say(f"{name} with all numbers free")
@@ -142,11 +143,11 @@ def refined(
     except IMPOSSIBLE:
         return None
     heat = calibration.temperature(calibration.ALIKE_ERRORS, nothing - best)
-    spread = np.linalg.inv((normal - np.eye(len(x))) / heat + np.eye(len(x)))
+    near_by = np.linalg.inv((normal - np.eye(len(x))) / heat + np.eye(len(x)))
     rng = np.random.default_rng([case.settings.seed, 3])
-    near = rng.multivariate_normal(x, spread, DRAWS)
+    near = rng.multivariate_normal(x, near_by, DRAWS)
     others = aside(begun, heat) if begun else np.zeros((DRAWS, 3))
-    near[:, own : own + 3] += others / SPREAD
+    near[:, own : own + 3] += others / spread
     laws = [list(d) for d in zip(*(all_turned(one)[0] for one in near), strict=True)]
-    known = Known(spread[own : own + 3, own : own + 3] * np.outer(SPREAD, SPREAD) + softness(clip), others)
+    known = Known(near_by[own : own + 3, own : own + 3] * np.outer(spread, spread) + softness(clip), others)
     return Refined(all_turned(x)[0], laws, there, known, response, nothing - best)

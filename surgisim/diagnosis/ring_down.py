@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surgisim.diagnosis import calibration
-from surgisim.diagnosis.base import SPREAD, START, bounded, carried, run_base, values_on
+from surgisim.diagnosis.base import bounded, carried, run_base, values_on
 from surgisim.diagnosis.clip import OPENS, Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric
@@ -28,10 +28,10 @@ LATE = 0.5
 is the same everywhere in it has .29, and whoever marks frames may be a frame off."""
 EARLIEST, LATEST = -1.4, 2.4
 """Of a release after a grip's last active frame that is tried [frames]."""
-STIFFNESSES = tuple(np.log(np.geomspace(6e2, 3.6e4, 8)) - START[0])
-LAGS = tuple(np.log(np.array([2e-4, 2e-3, 1.2e-2])) - START[2])
+STIFFNESSES = tuple(np.log(np.geomspace(6e2, 3.6e4, 8)))
+LAGS = tuple(np.log(np.array([2e-4, 2e-3, 1.2e-2])))
 MOMENTS = (0.0, 0.5, 1.0)
-"""Where a descent may start, in logarithms of E and of eta / E away from START, and moments of release [frames]. A step
+"""Where a descent may start, logarithms of E and of eta / E, and moments of release [frames]. A step
 of 1.8 in E is one of a third in pitch: within half a period of the next one while a ring-down lasts two."""
 KEPT = ((1, 5), (2, 3))
 """Steps that every descent still tried goes, and how many go on then."""
@@ -86,12 +86,12 @@ class RingDown:
     @property
     def middle(self) -> np.ndarray:
         """Of the prior, (3 + R,)."""
-        return np.concatenate([START, np.full(len(self.x) - 3, OPENS)])
+        return np.concatenate([self.clip.prior.middle, np.full(len(self.x) - 3, OPENS)])
 
     @property
     def reach(self) -> np.ndarray:
         """Its standard deviation, (3 + R,)."""
-        return np.concatenate([SPREAD, np.full(len(self.x) - 3, LATE)])
+        return np.concatenate([self.clip.prior.spread, np.full(len(self.x) - 3, LATE)])
 
     def bounded(self, y: np.ndarray) -> np.ndarray:
         return np.concatenate([bounded(y[:3], self.clip), np.clip(y[3:], EARLIEST, LATEST)])
@@ -148,8 +148,9 @@ class RingDown:
         if left is None:
             return y
         J = self.whiten(self.by_poisson)[:, None]
-        normal = float(self.space.gram(J, J)[0, 0]) + 1 / SPREAD[1] ** 2
-        y[1] += (float(self.space.gram(J, left[:, None])[0, 0]) - (y[1] - START[1]) / SPREAD[1] ** 2) / normal
+        middle, sure = self.clip.prior.middle[1], self.clip.prior.spread[1] ** -2
+        normal = float(self.space.gram(J, J)[0, 0]) + sure
+        y[1] += (float(self.space.gram(J, left[:, None])[0, 0]) - (y[1] - middle) * sure) / normal
         return self.bounded(y)
 
     def begun(self, y: np.ndarray, body: int = 0) -> Descent:
@@ -165,7 +166,7 @@ class RingDown:
         for n, e in enumerate(STIFFNESSES, 1):
             for lag, opens in ways:
                 y = steady.copy()
-                y[[0, 2]], y[3:] = (START[0] + e, START[2] + lag), opens
+                y[[0, 2]], y[3:] = (e, lag), opens
                 # What may not be tried as it is is no start of its own.
                 if np.allclose(self.bounded(y), y):
                     tries.append(y)

@@ -7,7 +7,6 @@ slopes are those of small changes, its numbers are drawn as surely as the record
 
 import numpy as np
 
-from surgisim.diagnosis.base import SPREAD
 from surgisim.diagnosis.context import Case
 
 
@@ -19,7 +18,7 @@ def drawn(case: Case, rng: np.random.Generator) -> np.ndarray:
         moved = moved + clip.error
     for group in case.groups:
         moved = moved + np.tensordot(rng.standard_normal(len(group.columns)), group.columns, (0, 0))
-    near = np.sqrt(np.diag(base.known.near)) / SPREAD
+    near = np.sqrt(np.diag(base.known.near)) / clip.prior.spread
     share = np.minimum(near, 1.0) * rng.standard_normal(len(base.slopes))
     moved[:, : clip.until] += np.tensordot(share, base.slopes, (0, 0))
     if case.settings.offsets:

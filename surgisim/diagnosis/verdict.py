@@ -62,7 +62,7 @@ def write(
     verdict, chances, named = said_of.verdict, said_of.chances, said_of.named
     if verdict == "unexplained":
         left = max(explainable(case.smooth), said_of.chosen.fitted.gain)
-        case = replace(case, base=replace(base, known=base.known.beside(left)))
+        case = replace(case, base=replace(base, known=base.known.beside(left, case.clip.prior)))
     members = [*said_of.accepted, *said_of.others]
     effects = [_effect(case, r, chances, {m.term for m in members}) for r in members]
     noise, explained = said_of.noise, said_of.explained

@@ -11,6 +11,8 @@ from surgisim.problem import Problem
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 STARTS = ("settled", "released")
+EXPECTED = ("E", "eta / E")
+"""Numbers of a base that may be known beforehand."""
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -26,7 +28,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def facts(path: Path, expected: str) -> dict[str, Any]:
-    """recording.json: name, fps, frames, unit [m], density, gravity, tier, starts, doubts, astray."""
+    """recording.json: name, fps, frames, unit [m], density, gravity, tier, starts, doubts, astray, expected."""
     body = read_json(path)
     needed = ("format", "name", "fps", "frames", "length_unit", "density_kg_m3", "gravity_m_s2", "tier")
     missing = [key for key in needed if key not in body]
@@ -60,8 +62,14 @@ def facts(path: Path, expected: str) -> dict[str, Any]:
     astray = body.get("astray", 0.0)
     if not _number(astray) or astray < 0:
         raise Problem(f"{path}: 'astray' is {astray!r}, but a share of how far points go is wanted, 0 or more.")
+    expected = body.get("expected", {})
+    if not isinstance(expected, dict) or not all(name in EXPECTED and _span(s) for name, s in expected.items()):
+        raise Problem(
+            f"{path}: 'expected' is {expected!r}, but [low, high] above 0 of some of {list(EXPECTED)} is wanted."
+        )
     return {
         "name": name,
+        "expected": {name: (float(low), float(high)) for name, (low, high) in expected.items()},
         "doubts": doubts,
         "astray": float(astray),
         "fps": float(fps),
@@ -121,6 +129,10 @@ def split_of(path: Path, frames: int) -> dict[str, tuple[int, int]]:
 
 def _number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _span(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(_number, value)) and 0 < value[0] < value[1]
 
 
 def _vector(value: Any) -> bool:

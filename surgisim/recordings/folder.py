@@ -2,7 +2,8 @@
 
 recording.json  format, name, fps, frames, length_unit (m, cm or mm; of every file), density_kg_m3 or null,
                 gravity_m_s2 [x, y, z] or null, tier; optional starts: "settled" (default) or "released";
-                astray: of how far a point has gone, how far its track is off, beside sigma
+                astray: of how far a point has gone, how far its track is off, beside sigma; expected: 90 % intervals
+                [low, high] of the base's "E" [Pa] and "eta / E" [s], where they are known beforehand
 rest.ply        closed triangle mesh of the body at rest
 fixed.json      {"boxes": [{"min": [x, y, z], "max": [x, y, z]}]}: regions of rest space held still;
                 optional torn: walls along z, [[x, y], [x, y]] each, through which the body does not hang together
@@ -108,6 +109,7 @@ def read_recording(folder: Path) -> Recording:
         ways=ways,
         doubts=_doubts(folder, told["doubts"], tracks.get("doubts"), unit),
         astray=told["astray"],
+        expected=told["expected"],
         split=split_of(folder / "split.json", frames) if (folder / "split.json").is_file() else None,
     )
 
@@ -141,6 +143,8 @@ def encoded_recording(recording: Recording) -> dict[str, bytes]:
         tracks["ways"] = recording.ways
     if recording.astray:
         told["astray"] = recording.astray
+    if recording.expected:
+        told["expected"] = {name: list(span) for name, span in recording.expected.items()}
     if recording.doubts:
         told["doubts"] = list(recording.doubts)
         tracks["doubts"] = np.stack(list(recording.doubts.values())).astype(np.float32)

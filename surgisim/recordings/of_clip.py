@@ -7,6 +7,7 @@ from skimage.measure import marching_cubes
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.doubts import Doubts
+from surgisim.artifacts.fit import Fit
 from surgisim.artifacts.frames import AFTER, Frames
 from surgisim.artifacts.material import Material
 from surgisim.artifacts.motion import Motion
@@ -32,7 +33,7 @@ MARGIN = 4
 
 def recording_of(
     name: str, body: Body, material: Material, physics: Physics, tracks: Tracks, motion: Motion, frames: Frames,
-    camera: Camera, doubts: Doubts,
+    camera: Camera, doubts: Doubts, fit: Fit,
 ) -> Recording:  # fmt: skip
     """Tracked points, grips, body and held boundary of a clip, in the camera's frame.
 
@@ -70,9 +71,21 @@ def recording_of(
         ways=rays(points[:, 0].astype(float)),
         doubts={str(name): moved[kept].astype(float) for name, moved in zip(doubts.names, doubts.moved, strict=True)},
         astray=ASTRAY,
+        expected=expected_of(fit),
         split=split,
         torn=body.torn,
     )
+
+
+def expected_of(fit: Fit) -> dict[str, tuple[float, float]]:
+    """90 % intervals of the base's "E" [Pa] and "eta / E" [s], as far as a fit has them."""
+    found = {}
+    for name, one in fit.identifiability.items():
+        parts = [part.rpartition(".")[2] for part in name.split(" / ")]
+        known = {("E",): "E", ("eta", "E"): "eta / E"}.get(tuple(parts))
+        if known and one["low"] > 0 and not one["at_edge"]:
+            found[known] = float(one["low"]), float(one["high"])
+    return found
 
 
 def rays(points: np.ndarray) -> np.ndarray:

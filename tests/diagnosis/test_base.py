@@ -1,6 +1,7 @@
 """The base's fit: stiffness, viscosity and the moment of a release together; of bodies that look alike the softest."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,13 +10,14 @@ from planted import GRID, TRUE, case_of, memo_of, plain, recording
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import base_fit as fitting
 from surgisim.diagnosis import ring_down
-from surgisim.diagnosis.base import SPREAD, START, Base, Known, tracks_of
+from surgisim.diagnosis.base import Base, Known, tracks_of
 from surgisim.diagnosis.calibration import ALIKE_ERRORS, MISFIT
 from surgisim.diagnosis.clip import OPENS, clip_of
 from surgisim.diagnosis.diagnose import prepare_case
 from surgisim.diagnosis.joint import based
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.nuisance import FINER
+from surgisim.diagnosis.prior import SPREAD, START, SUREST, USUAL, prior_of
 from surgisim.mpm.simulator import Breakdown
 
 QUICK = 50.0
@@ -77,6 +79,21 @@ def test_what_is_hardly_surer_than_beforehand_is_untold():
     assert untold(0.3, 0.9, 0.5, bound=("eta / E",)) == ("nu", "eta / E")
 
 
+def test_what_is_known_beforehand_narrows_the_prior_and_never_widens_it():
+    def prior(**expected):
+        return prior_of(SimpleNamespace(expected={name.replace("_", " / "): s for name, s in expected.items()}))
+
+    usual, known = prior(), prior(E=(500.0, 2000.0))
+    assert usual.middle == pytest.approx(START)
+    assert usual.spread == pytest.approx(SPREAD)
+    assert np.exp(known.middle[0]) == pytest.approx(1000.0)
+    assert known.spread[0] == pytest.approx(np.log(4.0) / 3.29)
+    assert known.middle[1:] == pytest.approx(START[1:])
+    assert known.spread[1:] == pytest.approx(SPREAD[1:])
+    assert prior(eta_E=(1e-3, 1.01e-3)).spread[2] == SUREST
+    assert prior(E=(1.0, 1e6)).spread[0] == SPREAD[0]
+
+
 def test_no_interval_reaches_a_ratio_at_which_pressure_would_make_tissue_larger():
     near = np.diag([0.0, 0.03**2, 0.0])
     drawn = Known(near, np.zeros((400, 3))).draws(np.array([START[0], 0.48, START[2]]))
@@ -89,13 +106,13 @@ def test_beside_what_nobody_knows_a_base_is_less_surely_known_up_to_what_is_know
     prior, near = np.diag(SPREAD**2), np.diag((0.1 * SPREAD) ** 2)
     aside = np.full((4, 3), 0.01)
     known = Known(near, aside)
-    assert known.beside(0.0).near == pytest.approx(near)
-    assert known.beside(1e9).near == pytest.approx(prior, rel=1e-3)
+    assert known.beside(0.0, USUAL).near == pytest.approx(near)
+    assert known.beside(1e9, USUAL).near == pytest.approx(prior, rel=1e-3)
     # Where its share of what is left is as much as errors that samples have alike, numbers are told half as surely.
-    there = known.beside(ALIKE_ERRORS / MISFIT)
+    there = known.beside(ALIKE_ERRORS / MISFIT, USUAL)
     assert np.diag(there.near) == pytest.approx(SPREAD**2 / (1 + 0.5 * 99.0))
     assert there.aside is aside
-    assert Known(prior, aside).beside(100.0).near == pytest.approx(prior)
+    assert Known(prior, aside).beside(100.0, USUAL).near == pytest.approx(prior)
 
 
 def test_a_base_is_fitted_anew_where_a_run_fits_worse_than_promised(monkeypatch):

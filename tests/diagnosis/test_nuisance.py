@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import diagnose, nuisance, perceived
-from surgisim.diagnosis.base import SPREAD, Known, carried, displacement_gradient, tracks_of
+from surgisim.diagnosis.base import Known, carried, displacement_gradient, tracks_of
 from surgisim.diagnosis.diagnose import whitened
 from surgisim.diagnosis.errors import as_filmed, rms
 from surgisim.diagnosis.evidence import Finding, Score
@@ -22,6 +22,7 @@ from surgisim.diagnosis.left_open import drifted, nuisances, told
 from surgisim.diagnosis.metric import metric
 from surgisim.diagnosis.noise import whitener
 from surgisim.diagnosis.nuisance import chosen
+from surgisim.diagnosis.prior import SPREAD
 from surgisim.diagnosis.self_consistency import drawn
 
 NAMES = (

@@ -8,6 +8,7 @@ from slab import pulled, slab
 
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.doubts import Doubts
+from surgisim.artifacts.fit import Fit
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.material import Material
 from surgisim.artifacts.physics import Physics
@@ -41,7 +42,10 @@ def clip(seen=True):
     moved = np.zeros((1, k, T, 3), np.float32)
     moved[0, :, 8:, 0] = 1e-4
     doubts = Doubts(np.array(["held.depth"]), moved)
-    return body, material, physics, tracks, motion, frames, camera, doubts
+    known = {"low": 400.0, "high": 900.0, "at_edge": False}
+    slow = {"low": 1e-3, "high": 4e-3, "at_edge": False}
+    table = {"corotated.E": known, "corotated.nu": known, "newtonian.eta": known, "newtonian.eta / corotated.E": slow}
+    return body, material, physics, tracks, motion, frames, camera, doubts, Fit([], table, {}, "")
 
 
 def test_a_clip_survives_the_way_through_a_folder(tmp_path):
@@ -50,6 +54,7 @@ def test_a_clip_survives_the_way_through_a_folder(tmp_path):
     back = read_recording(tmp_path)
     assert back.split == {"fit": (0, T - 5), "held_out": (T - 5, T)}
     assert back.doubts["held.depth"][:, 9] == pytest.approx(np.tile([1e-4, 0, 0], (len(back.points), 1)))
+    assert back.expected == {"E": (400.0, 900.0), "eta / E": (1e-3, 4e-3)}
     assert not back.visible[3, 5:9].any()
     assert back.mesh.volume == pytest.approx(float(body.volume.sum()), rel=0.12)
     filled = back.body(body.spacing)

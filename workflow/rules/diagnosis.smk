@@ -14,6 +14,7 @@ rule recorded:
         frames=upstream("ingest", "frames.npz"),
         camera=upstream("ingest", "camera.json"),
         doubts=upstream("estimation", "doubts.npz"),
+        fit=upstream("estimation", "fit.json"),
     output:
         recording="results/{clip}/{variant}/diagnosis/recording/recording.json",
         rest="results/{clip}/{variant}/diagnosis/recording/rest.ply",
@@ -36,6 +37,7 @@ rule recorded:
         'python "$SURGISIM/stages/recorded.py"'
         " --body {input.body} --material {input.material} --physics {input.physics} --tracks {input.tracks}"
         " --motion {input.motion} --frames {input.frames} --camera {input.camera} --doubts {input.doubts}"
+        " --fit {input.fit}"
         " --recording {output.recording} --rest {output.rest} --fixed {output.fixed} --grip {output.grip}"
         " --points {output.points} --split {output.split}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"

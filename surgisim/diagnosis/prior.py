@@ -1,0 +1,41 @@
+"""What a base's numbers are taken to be before a recording is looked at, or as whoever recorded it knows them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from surgisim.recordings.recording import Recording
+
+START = np.array([np.log(5e3), 0.45, np.log(2e-3)])
+"""log E [Pa], nu, log eta / E [s]: soft tissue and silicone gels lie between 1 and 50 kPa and .3 and 20 ms."""
+SPREAD = np.array([1.2, 0.03, 1.4])
+LOGARITHMIC = {"E": 0, "eta / E": 2}
+"""Numbers that may be known beforehand, and where they stand: of Poisson's ratio a coarse grid has one of its own."""
+SUREST = 0.15
+"""Least spread of a number that is known beforehand: another grid, and a body of another form, differ by so much."""
+NINETY = 1.645
+"""Half of a 90 % interval over a standard deviation."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Of log E, nu and log eta / E."""
+
+    middle: np.ndarray
+    """(3,)"""
+    spread: np.ndarray
+    """Standard deviation, (3,)."""
+
+
+USUAL = Prior(START, SPREAD)
+"""Of tissue of which nothing is known."""
+
+
+def prior_of(recording: Recording) -> Prior:
+    """Usual tissue's, narrowed to what the recording says is known of its base; never wider than that."""
+    middle, spread = USUAL.middle.copy(), USUAL.spread.copy()
+    for name, (low, high) in recording.expected.items():
+        k = LOGARITHMIC[name]
+        middle[k] = 0.5 * (np.log(low) + np.log(high))
+        spread[k] = np.clip((np.log(high) - np.log(low)) / (2 * NINETY), SUREST, SPREAD[k])
+    return Prior(middle, spread)
