@@ -47,6 +47,8 @@ class Explanation:
     """Whether it rises by more than that."""
     may_leave: float = calibration.PUSH_LEAVES
     """Share of what a smooth field could explain that a push may leave."""
+    smooth: float = 1.0
+    """What a smooth field could explain, over what its laws do."""
 
     @property
     def first(self) -> Refit:
@@ -157,8 +159,8 @@ def _judged_ahead(case: Case, fitted: Joint) -> Explanation:
         # A guessed body is off by as much as noise everywhere: only beyond that a rise says something.
         rises = rises and rms(case, fitted.moved)[1] > noise_floor(case.noise)
     may_leave = 1 - calibration.HALF if guessed(case) else calibration.PUSH_LEAVES
-    left = still(case, fitted.moved)
-    return Explanation(fitted, fitted.refits[0].log_evidence, ahead, left, out, falls, rises, may_leave)
+    left, smooth = still(case, fitted.moved), explainable(case.smooth) / max(fitted.gain, 1e-9)
+    return Explanation(fitted, fitted.refits[0].log_evidence, ahead, left, out, falls, rises, may_leave, smooth)
 
 
 def judged(
@@ -316,14 +318,16 @@ def _reason_guessed(
 
     What a guessed body gets wrong is larger than noise and told from it; a law explains little of it, and nothing is
     said then. One that is there takes most of the misfit away, also in frames held out, but not all of it; where those
-    are off by no more than noise, the plain error of the fitted ones must bear it out.
+    are off by no more than noise, the plain error of the fitted ones must bear it out. What a law takes away that no
+    smooth motion could is single tracks' own.
     """
     if not case.clip.held[: case.clip.until].any():
         return "ungrasped"
     free = not case.settings.calibrated
     certain = free or chosen.log_evidence >= calibration.CLEAR
     seen = free or later is not None or borne >= calibration.BORNE_OUT
-    if not (certain and seen and chosen.enough and 1 - chosen.left >= calibration.HALF):
+    most = min(1 - chosen.left, chosen.smooth)
+    if not (certain and seen and chosen.enough and most >= calibration.HALF):
         return "faint"
     doubts = {
         "drawn": chosen.drawn,

@@ -214,6 +214,8 @@ def test_a_tie_with_a_placebo_is_no_defeat():
         (explanation(left=0.3), True, 0.9, 0.9, "named"),
         # A guessed body is off by more than noise: what explains little of that says nothing, however sure it looks.
         (explanation(left=0.6), True, 0.9, 0.9, "faint"),
+        # Single tracks go astray in ways of their own, and a push follows them.
+        (replace(explanation(left=0.0), smooth=0.1), True, 0.9, 0.9, "faint"),
         (explanation(evidence=CLEAR - 1), True, 0.9, 0.9, "faint"),
         # Frames held out speak for it where they can, before what the fitted ones bear out.
         (explanation(left=0.3), True, -1.0, 0.9, "named"),
