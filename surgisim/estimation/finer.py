@@ -23,8 +23,8 @@ Say = Callable[[float, float, str], None]
 def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[Trial, Solution]:
     """The fit on a finer grid; the same one, with a line in `history`, where that cannot be simulated.
 
-    The first steps go by the wider grid's derivative. Then what paces waves gets one of its own; how tissue is carried,
-    how deep it is held and how its volume gives way moves it alike on both grids.
+    The first steps go by the wider grid's derivative. Then what paces waves gets one of its own, unless nothing tells
+    their pace; how tissue is carried, how deep it is held and how its volume gives way moves it alike on both grids.
     """
     fine = replace(trial, laying=trial.laying.finer(FINER))
     # Steps are simulated one after another, so each has all the threads.
@@ -37,6 +37,8 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
         # A finer grid follows a sharper fold, and can turn inside out where a wider one does not.
         history.append({"round": "finer grid", "cost": None, "broke": BROKE})
         return trial, solution
+    if trial.eased is not None:
+        return fine, replace(solution, x=found.x, residual=found.residual)
     say(0.4, 1.0, f"on a finer grid: {plain(wanted, found.x)}")
     try:
         waves = np.where(wanted.paces, fine.differences, 0.0)

@@ -185,8 +185,11 @@ def estimate(
         table = _known(trial, solution, model, phase, settings)
         wide, wide_x = trial, solution.x
         if trial.laying and any(q["told"] for q in table.values()):
-            trial, solution = finely(trial, solution, history, _part(progress, 0.7, 0.8))
-            shift = solution.x - wide_x
+            fine, finest = finely(trial, solution, history, _part(progress, 0.7, 0.8))
+            shift = finest.x - wide_x
+            # What nothing tells the pace of has no waves that ask for it: it tells how far a grid is off, and no more.
+            if trial.eased is None:
+                trial, solution = fine, finest
             table = _known(trial, solution, model | {"grid": np.outer(shift, shift)}, phase, settings)
         finer = trial is not wide
         # What fits may yet turn the tissue inside out in the frames after those that were compared.

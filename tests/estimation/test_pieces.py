@@ -114,7 +114,7 @@ def test_a_strip_is_told_from_the_block_it_lies_on(swinging):
     found = estimate(*swinging, Estimation(**QUICK | {"iterations": 1}), silent)
     costs = {h["as"]: h["cost"] for h in found.fit.history if h["round"] == "hold" and "grip" not in h}
     without = next(h["without"] for h in found.fit.history if h["round"] == "hold")
-    assert costs["parted piece"] < 0.5 * min(without, *(c for name, c in costs.items() if name != "parted piece"))
+    assert costs["parted piece"] < 0.5 * min([without, *(c for name, c in costs.items() if name != "parted piece")])
     assert len(found.body.torn)
     assert not (found.body.held & strip(found.body.rest) & (found.body.rest[:, 0] > 0)).any()
     assert "slides past what lies beside it" in found.fit.words
