@@ -12,7 +12,7 @@ SPREAD = np.array([1.2, 0.03, 1.4])
 LOGARITHMIC = {"E": 0, "eta / E": 2}
 """Numbers that may be known beforehand, and where they stand: of Poisson's ratio a coarse grid has one of its own."""
 SUREST = 0.15
-"""Least spread of a number that is known beforehand: another grid, and a body of another form, differ by so much."""
+"""Least spread of a number that is known beforehand, for another grid and a body of another form; chosen."""
 NINETY = 1.645
 """Half of a 90 % interval over a standard deviation."""
 
@@ -32,7 +32,11 @@ USUAL = Prior(START, SPREAD)
 
 
 def prior_of(recording: Recording) -> Prior:
-    """Usual tissue's, narrowed to what the recording says is known of its base; never wider than that."""
+    """Usual tissue's, narrowed to what the recording says is known of its base; never wider than that.
+
+    Of a video an estimation knows it by the same tracks, which count twice then: intervals of the base may be too
+    narrow by that, and their coverage has not been measured.
+    """
     middle, spread = USUAL.middle.copy(), USUAL.spread.copy()
     for name, (low, high) in recording.expected.items():
         k = LOGARITHMIC[name]

@@ -62,14 +62,14 @@ def facts(path: Path, expected: str) -> dict[str, Any]:
     astray = body.get("astray", 0.0)
     if not _number(astray) or astray < 0:
         raise Problem(f"{path}: 'astray' is {astray!r}, but a share of how far points go is wanted, 0 or more.")
-    expected = body.get("expected", {})
-    if not isinstance(expected, dict) or not all(name in EXPECTED and _span(s) for name, s in expected.items()):
+    known = body.get("expected", {})
+    if not isinstance(known, dict) or not all(name in EXPECTED and _span(s) for name, s in known.items()):
         raise Problem(
-            f"{path}: 'expected' is {expected!r}, but [low, high] above 0 of some of {list(EXPECTED)} is wanted."
+            f"{path}: 'expected' is {known!r}, but [low, high] above 0 of some of {list(EXPECTED)} is wanted."
         )
     return {
         "name": name,
-        "expected": {name: (float(low), float(high)) for name, (low, high) in expected.items()},
+        "expected": {name: (float(low), float(high)) for name, (low, high) in known.items()},
         "doubts": doubts,
         "astray": float(astray),
         "fps": float(fps),

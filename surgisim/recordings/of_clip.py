@@ -78,13 +78,13 @@ def recording_of(
 
 
 def expected_of(fit: Fit) -> dict[str, tuple[float, float]]:
-    """90 % intervals of the base's "E" [Pa] and "eta / E" [s], as far as a fit has them."""
+    """90 % intervals of the base's "E" [Pa] and "eta / E" [s], as far as a fit has them; of the first law with one."""
     found = {}
     for name, one in fit.identifiability.items():
         parts = [part.rpartition(".")[2] for part in name.split(" / ")]
         known = {("E",): "E", ("eta", "E"): "eta / E"}.get(tuple(parts))
         if known and one["low"] > 0 and not one["at_edge"]:
-            found[known] = float(one["low"]), float(one["high"])
+            found.setdefault(known, (float(one["low"]), float(one["high"])))
     return found
 
 
