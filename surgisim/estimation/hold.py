@@ -17,7 +17,7 @@ ONE_PIECE, IN_PIECES = ("carried edge", "hung"), ("loose piece", "parted piece")
 """Other ways in which a body may be held, the plainer first."""
 WORTH = dict.fromkeys(ONE_PIECE, 2.0) | dict.fromkeys(IN_PIECES, 1.25)
 """Times the misfit of the best of them, before the shape is fitted, beyond which it is not fitted to one; chosen. Of
-six real clips and seven of family 281131 those that were taken began with at most 1.48 of it, and none was in pieces."""
+six real clips and seven of family 281131 those that were taken began with at most 1.48 of it, none in pieces."""
 
 Say = Callable[[float, float, str], None]
 
