@@ -1,5 +1,7 @@
 """Settings of the canonical scene and its deformation field."""
 
+from typing import Literal
+
 from pydantic import Field
 
 from surgisim.config.base import Settings
@@ -15,8 +17,10 @@ class Reconstruction(Settings):
     """Seed of the frames' order and of the head's first weights [1]."""
     rest_every: int = Field(3, ge=0)
     """Every so many iterations frame 0 is looked at, out of turn: the canonical scene has to be it; 0 for never [1]."""
+    device: Literal["cpu", "cuda"] = "cpu"
+    """Where it is fitted; on 'cuda' gsplat draws, and two runs differ in the last digits [-]."""
     threads: int = Field(2, ge=1)
-    """Threads of the linear algebra; the result depends on it in the last digits [1]."""
+    """Threads of the linear algebra on the CPU; the result depends on it in the last digits [1]."""
 
     gaussians_per_pixel: float = Field(0.5, gt=0, le=1)
     """Gaussians to start from for each pixel of tissue [1/px]."""

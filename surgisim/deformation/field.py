@@ -8,7 +8,7 @@ adds dS without saying in which scale; the logarithm keeps radii positive.
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +17,8 @@ import torch
 from surgisim.artifacts.deformation import Deformation
 from surgisim.artifacts.scene import Scene
 from surgisim.deformation.planes import Layout, features
+from surgisim.deformation.sheets import Sheets
+from surgisim.deformation.smoothness import roughness
 from surgisim.problem import Problem
 
 OUTPUTS = (3, 1, 4, 3)
@@ -33,9 +35,11 @@ class Field:
     high: np.ndarray
     """Upper corner, (4,)."""
     planes: torch.Tensor
-    """All planes end to end."""
+    """All planes end to end; the sheets of them where there are `sheets`."""
     head: tuple[torch.Tensor, ...]
     """Weight matrices, each (out, in), without biases."""
+    sheets: Sheets | None = None
+    """How planes lie beside each other on a GPU."""
 
     def __call__(self, mean: torch.Tensor, time: float) -> tuple[torch.Tensor, ...]:
         """dmu [m] (G, 3), do (G,), dR (G, 4), dS (G, 3) of Gaussians resting at `mean` [m], (G, 3), at `time` [s].
@@ -45,16 +49,33 @@ class Field:
         if self.clock(time) <= 0:
             count = len(mean)
             return tuple(mean.new_zeros(n) for n in ((count, 3), count, (count, 4), (count, 3)))
-        x = features(self.planes, self.inside(mean), self.clock(time), self.layout)
+        where, clock = self.inside(mean), self.clock(time)
+        if self.sheets:
+            x = self.sheets.features(self.planes, where, clock)
+        else:
+            x = features(self.planes, where, clock, self.layout)
         for weight in self.head[:-1]:
             # Not a ReLU: its slope at 0, where every feature starts, is 0, and nothing would ever move.
             x = torch.nn.functional.silu(torch.nn.functional.linear(x, weight))
         moved, opacity, turn, grow = torch.nn.functional.linear(x, self.head[-1]).split(OUTPUTS, 1)
         return moved * self.reach, opacity[:, 0], turn, grow
 
+    def roughness(self) -> tuple[torch.Tensor, torch.Tensor]:
+        """How far the planes are from smooth in space and in time, see `smoothness`."""
+        return self.sheets.roughness(self.planes) if self.sheets else roughness(self.planes, self.layout)
+
+    def on(self, device: torch.device) -> "Field":
+        """The same on this device: its planes as sheets on a GPU, end to end on the CPU."""
+        planes = self.sheets.unpack(self.planes) if self.sheets else self.planes
+        head, planes = tuple(weight.to(device) for weight in self.head), planes.to(device)
+        if device.type == "cpu":
+            return replace(self, planes=planes, head=head, sheets=None)
+        sheets = Sheets(self.layout, planes)
+        return replace(self, planes=sheets.pack(planes), head=head, sheets=sheets)
+
     def inside(self, mean: torch.Tensor) -> torch.Tensor:
         """Positions in the box, 0-1."""
-        low, high = (torch.as_tensor(a[:3], dtype=mean.dtype) for a in (self.low, self.high))
+        low, high = (mean.new_tensor(a[:3]) for a in (self.low, self.high))
         return (mean - low) / (high - low)
 
     def clock(self, time: float) -> float:

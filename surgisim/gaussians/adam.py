@@ -33,14 +33,22 @@ class Adam:
 
     def advance(self, factor: float) -> None:
         """One step of every watched tensor that has a gradient; factor: share of the step sizes to use."""
+        there: list[tuple[torch.Tensor, ...]] = []
+        rates: list[float] = []
         for name, tensor in self.tensors.items():
             if tensor.grad is None:
                 continue
             self._steps[name] += 1
             n = self._steps[name]
             rate = self.rates[name] * factor * math.sqrt(1 - SECOND**n) / (1 - FIRST**n)
-            flat = [a.detach().reshape(-1).numpy() for a in (tensor, *self._moments[name])]
-            _advance(*flat, tensor.grad.contiguous().reshape(-1).numpy(), rate)
+            flat = [a.detach().reshape(-1) for a in (tensor, *self._moments[name], tensor.grad)]
+            if tensor.device.type == "cpu":
+                _advance(*(a.numpy() for a in flat), rate)
+            else:
+                there.append(tuple(flat))
+                rates.append(rate)
+        if there:
+            _advance_all(*map(list, zip(*there, strict=True)), rates)
 
     def choose_rows(self, names: Iterable[str], rows: torch.Tensor, fresh: torch.Tensor) -> None:
         """Keep or repeat these rows of these tensors; rows marked `fresh` start with no memory."""
@@ -48,6 +56,19 @@ class Adam:
             self.tensors[name] = self.tensors[name].detach()[rows].contiguous()
             keep = (~fresh).reshape(-1, *[1] * (self.tensors[name].ndim - 1))
             self._moments[name] = tuple((m[rows] * keep).contiguous() for m in self._moments[name])
+
+
+def _advance_all(
+    value: list[torch.Tensor], first: list[torch.Tensor], second: list[torch.Tensor], slope: list[torch.Tensor],
+    rates: list[float],
+) -> None:  # fmt: skip
+    """The same for all tensors at once, on any device."""
+    torch._foreach_lerp_(first, slope, 1 - FIRST)
+    torch._foreach_mul_(second, SECOND)
+    torch._foreach_addcmul_(second, slope, slope, 1 - SECOND)
+    size = torch._foreach_sqrt(second)
+    torch._foreach_add_(size, TINY)
+    torch._foreach_addcdiv_(value, first, size, [-rate for rate in rates])
 
 
 @njit(cache=True, parallel=True, fastmath=True)

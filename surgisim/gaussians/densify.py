@@ -3,6 +3,7 @@
 Kerbl, Kopanas, Leimkuehler and Drettakis, 3D Gaussian splatting, 2023, section 5; here with a bound on their number.
 """
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -27,8 +28,8 @@ class Record:
     images: int = 0
 
     @classmethod
-    def empty(cls, count: int) -> "Record":
-        return cls(torch.zeros(count), torch.zeros(count))
+    def empty(cls, count: int, device: torch.device | str = "cpu") -> "Record":
+        return cls(torch.zeros(count, device=device), torch.zeros(count, device=device))
 
     def add(self, pull: torch.Tensor, shown: torch.Tensor) -> None:
         """Take in one image."""
@@ -48,10 +49,10 @@ def renew(adam: Adam, record: Record, most: int, share: float, widest: float) ->
     rows = keep.nonzero()[:, 0]
     room = max(min(most - len(rows), int(share * len(rows))), 0)
     worst = torch.argsort(record.pull[rows], descending=True, stable=True)[:room]
-    split = torch.zeros(len(rows), dtype=torch.bool)
+    split = torch.zeros(len(rows), dtype=torch.bool, device=rows.device)
     split[worst] = True
     twice = torch.cat([rows, rows[split]])
-    fresh = torch.cat([split, torch.ones(int(split.sum()), dtype=torch.bool)])
+    fresh = torch.cat([split, torch.ones(int(split.sum()), dtype=torch.bool, device=rows.device)])
     adam.choose_rows(ATTRIBUTES, twice, fresh)
     _part(adam, fresh, len(rows))
     return len(twice)
@@ -61,10 +62,10 @@ def _part(adam: Adam, fresh: torch.Tensor, first: int) -> None:
     """Move the two parts of each split Gaussian apart along its longest axis and shrink them."""
     mean, scale, rotation = (adam.tensors[name] for name in ("mean", "scale", "rotation"))
     axis = scale[fresh].argmax(1)
-    offset = _axes(rotation[fresh])[torch.arange(len(axis)), :, axis] * scale[fresh].amax(1, keepdim=True).exp() * 0.5
+    offset = _axes(rotation[fresh])[torch.arange(len(axis), device=axis.device), :, axis] * scale[fresh].amax(1, keepdim=True).exp() * 0.5
     side = torch.where(fresh.nonzero()[:, 0] < first, 1.0, -1.0)[:, None]
     mean[fresh] += side * offset
-    scale[fresh] -= torch.log(torch.tensor(SHRINK))
+    scale[fresh] -= math.log(SHRINK)
 
 
 def _axes(q: torch.Tensor) -> torch.Tensor:

@@ -25,6 +25,7 @@ def rasterise(
     camera: Camera,
     background: tuple[float, ...],
     near: float,
+    weigh: bool = True,
 ) -> tuple[torch.Tensor, ...]:
     """rgb, depth, alpha, weight; see surgisim.gaussians.rasterise."""
     missing = lacking()
@@ -44,7 +45,8 @@ def rasterise(
     image, alpha, facts = _draw(*attributes, color, camera, background, near, "RGB+D")
     if probe.requires_grad and facts["means2d"].requires_grad:
         facts["means2d"].register_hook(lambda gradient: _add_gradient(probe, gradient.reshape(-1, 2)))
-    return image[..., :3], image[..., 3], alpha, _weight(*attributes, camera, near)
+    weight = _weight(*attributes, camera, near) if weigh else mean.new_zeros(len(mean))
+    return image[..., :3], image[..., 3], alpha, weight
 
 
 def draw_covariances(

@@ -11,13 +11,12 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.scene import Scene
 from surgisim.config.reconstruction import Reconstruction
 from surgisim.deformation.field import Field, still_field
-from surgisim.deformation.smoothness import roughness
 from surgisim.gaussians.adam import Adam
 from surgisim.gaussians.densify import ATTRIBUTES, Record, renew
 from surgisim.gaussians.losses import anisotropic, masked_l1, trajectory
 from surgisim.gaussians.neighbours import groups
 from surgisim.gaussians.observations import Observations
-from surgisim.gaussians.rasterise import Image, rasterise
+from surgisim.gaussians.rasterise import Image, engine_on, rasterise
 from surgisim.gaussians.schedule import Phase, phase_at, rate_at
 from surgisim.problem import Problem
 
@@ -40,20 +39,21 @@ class Fit:
     """The state of the optimisation."""
 
     def __init__(self, start: Scene, seen: Observations, camera: Camera, length: int, settings: Reconstruction) -> None:
-        self.seen, self.camera, self.settings = seen, camera, settings
+        self.device = torch.device(settings.device)
+        self.seen, self.camera, self.settings = seen.on(self.device), camera, settings
         self.rng = np.random.default_rng(settings.seed)
-        self.field = first_field(start.mean, camera, length, settings, self.rng)
+        self.field = first_field(start.mean, camera, length, settings, self.rng).on(self.device)
         self.radius = float(np.exp(np.median(start.scale)))
         self.most = min(settings.most_gaussians, int(settings.growth * len(start.mean)))
         self.middle = float(np.median(start.mean[:, 2]))
         self.head = [f"head_{i}" for i in range(len(self.field.head))]
-        tensors = {name: torch.from_numpy(getattr(start, name)) for name in ATTRIBUTES}
+        tensors = {name: torch.from_numpy(getattr(start, name)).to(self.device) for name in ATTRIBUTES}
         tensors |= {"planes": self.field.planes} | dict(zip(self.head, self.field.head, strict=True))
         rates = {name: getattr(settings, f"rate_{name}") for name in (*ATTRIBUTES, "planes")}
         rates |= dict.fromkeys(self.head, settings.rate_head)
         self.adam = Adam(tensors, rates | {"mean": settings.rate_mean * self.field.reach})
         self.groups: torch.Tensor | None = None
-        self.record = Record.empty(len(start.mean))
+        self.record = Record.empty(len(start.mean), self.device)
 
     def run(self, progress: Say) -> np.ndarray:
         """All iterations; returns the history, (R, 5)."""
@@ -89,7 +89,8 @@ class Fit:
         mean = adam.tensors["mean"]
         moved, opacity, turn, grow = field(mean, time)
         radius = (adam.tensors["scale"] + grow).exp()
-        probe = torch.zeros(len(mean), 2, requires_grad=True)
+        recorded = iteration < RENEWALS[-1] * self.settings.iterations
+        probe = torch.zeros(len(mean), 2, device=self.device, requires_grad=recorded)
         image = rasterise(
             mean + moved,
             adam.tensors["rotation"] + turn,
@@ -97,7 +98,9 @@ class Fit:
             torch.sigmoid(adam.tensors["opacity"] + opacity),
             adam.tensors["color"],
             self.camera,
+            engine=engine_on(self.device),
             probe=probe,
+            weigh=recorded,
         )
         loss = self.misfit(phase, image, u) + self.priors(phase, field, radius, moved, time, iteration)
         if not torch.isfinite(loss):
@@ -111,10 +114,12 @@ class Fit:
             for name in self.head:
                 adam.tensors[name].grad = torch.zeros_like(adam.tensors[name])
         adam.advance(rate_at(iteration, self.settings.iterations, self.settings.rate_end))
-        self.record.add(probe.grad, image.weight)
+        if recorded:
+            self.record.add(probe.grad, image.weight)
         whole = self.seen.weight[u] == 1
-        error = (image.rgb.detach() - self.seen.rgb[u])[whole].square().mean() if whole.any() else torch.zeros(())
-        return float(loss.detach()), float(error)
+        wrong = (image.rgb.detach() - self.seen.rgb[u]).square().mean(-1)
+        error = (wrong * whole).sum() / whole.sum().clamp(min=1)
+        return tuple(torch.stack([loss.detach(), error]).tolist())
 
     def misfit(self, phase: Phase, image: Image, u: int) -> torch.Tensor:
         """Colour and depth of one frame against what was seen."""
@@ -141,22 +146,22 @@ class Fit:
             total = total + settings.anisotropy * anisotropic(radius, unit=unit, **limits)
         if phase.trajectory and settings.trajectory and time > 0 and iteration % TRAJECTORY_EVERY == 0:
             if self.groups is None:
-                points = self.adam.tensors["mean"].detach().numpy()
-                self.groups = torch.from_numpy(groups(points, settings.neighbours))
+                points = self.adam.tensors["mean"].detach().cpu().numpy()
+                self.groups = torch.from_numpy(groups(points, settings.neighbours)).to(self.device)
             before = field(self.adam.tensors["mean"], time - 1 / self.camera.fps)[0]
             literal = settings.trajectory_form == "literal"
             total = total + TRAJECTORY_EVERY * settings.trajectory * trajectory(
                 (moved - before) / self.radius, self.groups, literal=literal
             )
         if phase.moves_field:
-            space, rough = roughness(field.planes, field.layout)
+            space, rough = field.roughness()
             total = total + settings.smoothness_space * space + settings.smoothness_time * rough
         return total
 
     def renew(self) -> None:
         """Drop and split Gaussians."""
         renew(self.adam, self.record, self.most, SPLIT, WIDEST * self.radius)
-        self.record = Record.empty(len(self.adam.tensors["mean"]))
+        self.record = Record.empty(len(self.adam.tensors["mean"]), self.device)
         self.groups = None
 
     def current_field(self) -> Field:
@@ -165,11 +170,11 @@ class Fit:
         return replace(self.field, planes=self.adam.tensors["planes"], head=head)
 
     def result(self) -> tuple[Scene, Field]:
-        """The canonical scene and the field."""
+        """The canonical scene and the field, on the CPU."""
         self.adam.watch(())
-        arrays = {name: self.adam.tensors[name].numpy().copy() for name in ATTRIBUTES}
+        arrays = {name: self.adam.tensors[name].cpu().numpy().copy() for name in ATTRIBUTES}
         arrays["rotation"] /= np.linalg.norm(arrays["rotation"], axis=1, keepdims=True)
-        return Scene(**arrays), self.current_field()
+        return Scene(**arrays), self.current_field().on(torch.device("cpu"))
 
 
 def first_field(

@@ -7,6 +7,8 @@ changes.
 
 import torch
 
+TINY = 1e-20
+
 
 def masked_l1(value: torch.Tensor, target: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
     """Mean of |value - target| where `mask` (H, W) is true (or weighted, 0-1); 0 when it is nowhere.
@@ -16,7 +18,7 @@ def masked_l1(value: torch.Tensor, target: torch.Tensor, mask: torch.Tensor) -> 
     weight = mask.to(value.dtype)
     channels = value[0, 0].numel()
     total = (weight.reshape(*mask.shape, *[1] * (value.ndim - 2)) * (value - target).abs()).sum()
-    return total / (weight.sum() * channels) if bool(mask.any()) else total
+    return total / (weight.sum() * channels).clamp(min=TINY)
 
 
 def anisotropic(scale: torch.Tensor, *, unit: float, r_m: float = 1.0, r_ani: float = 3.0) -> torch.Tensor:

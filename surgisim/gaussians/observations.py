@@ -31,6 +31,11 @@ class Observations:
     trust: torch.Tensor
     """How much each pixel's depth counts, 0-1, (U, H, W)."""
 
+    def on(self, device: torch.device) -> "Observations":
+        """The same, on this device."""
+        moved = {name: getattr(self, name).to(device) for name in ("rgb", "weight", "z", "trust")}
+        return Observations(frame=self.frame, **moved)
+
 
 def observe(frames: Frames, inpainted: Inpainted, masks: Masks, depth: Depth, settings: Reconstruction) -> Observations:
     """The used frames with their weights. Raises Problem if the inputs are not of one clip."""

@@ -5,7 +5,9 @@ gsplat  CUDA, float32
 twin    torch, any float type, slow and readable: what the other two are measured against
 """
 
+import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -43,6 +45,7 @@ def rasterise(
     engine: Engine = "numba",
     probe: torch.Tensor | None = None,
     near: float = 1e-3,
+    weigh: bool = True,
 ) -> Image:
     """The image of the Gaussians, with gradients for their five attributes from rgb, depth and alpha.
 
@@ -54,6 +57,7 @@ def rasterise(
     background  sRGB 0-1 behind everything; black if None
     probe       zeros (G, 2) that want a gradient; after backward they hold that of the projected centres [1/px]
     near        what is closer along z is not drawn [m]
+    weigh       whether `weight` is asked for: gsplat draws once more for it, and leaves it 0 where it is not
 
     Raises Problem for shapes that do not fit, values that are not finite, opacities outside 0-1, and a missing
     CUDA engine.
@@ -66,12 +70,19 @@ def rasterise(
     if engine == "numba":
         from surgisim.gaussians.engine_numba import rasterise as draw
     elif engine == "gsplat":
-        from surgisim.gaussians.engine_gsplat import rasterise as draw
+        from surgisim.gaussians.engine_gsplat import rasterise as draw_on_gpu
+
+        draw = partial(draw_on_gpu, weigh=weigh)
     elif engine == "twin":
         from surgisim.gaussians.twin import rasterise as draw
     else:
         raise Problem(f"rasterise: engine is '{engine}', and there are numba, gsplat and twin.")
     return Image(*draw(mean, rotation, scale, opacity, color, probe, camera, back, near))
+
+
+def engine_on(device: torch.device) -> Engine:
+    """The engine that draws what lies on a device."""
+    return "gsplat" if device.type == "cuda" else "numba"
 
 
 def render(
@@ -84,12 +95,15 @@ def render(
     *,
     background: tuple[float, float, float] | None = None,
     near: float = 1e-3,
+    device: str = "cpu",
 ) -> Image:
-    """`rasterise` on the CPU for numpy arrays, without gradients."""
+    """`rasterise` for numpy arrays, without gradients."""
+    there = torch.device(device)
     arrays = (np.ascontiguousarray(a, np.float32) for a in (mean, rotation, scale, opacity, color))
     with torch.no_grad():
-        seen = rasterise(*(torch.from_numpy(a) for a in arrays), camera, background=background, near=near)
-    return Image(seen.rgb.numpy(), seen.depth.numpy(), seen.alpha.numpy(), seen.weight.numpy())
+        tensors = (torch.from_numpy(a).to(there) for a in arrays)
+        seen = rasterise(*tensors, camera, background=background, near=near, engine=engine_on(there))
+    return Image(*(a.cpu().numpy() for a in (seen.rgb, seen.depth, seen.alpha, seen.weight)))
 
 
 def to_bytes(rgb: np.ndarray) -> np.ndarray:
@@ -103,14 +117,19 @@ def _check(attributes: dict[str, torch.Tensor]) -> None:
     for name, tensor in attributes.items():
         if tuple(tensor.shape) != wanted[name]:
             raise Problem(f"rasterise: {name} has shape {tuple(tensor.shape)}, and {wanted[name]} is wanted.")
-        # A sum is not finite as soon as one value is not, and costs a fifth of testing each.
-        if not torch.isfinite(tensor.detach().sum()):
-            bad = (~torch.isfinite(tensor.detach()).reshape(g, -1).all(1)).nonzero().ravel()
-            if len(bad):
-                raise Problem(f"rasterise: {name} is not finite for {len(bad)} of {g} Gaussians, first {int(bad[0])}.")
-    if g:
-        low, high = (float(v) for v in attributes["opacity"].detach().aminmax())
-        if low < 0 or high > 1:
-            raise Problem(f"rasterise: opacity runs from {low:g} to {high:g}, and 0 to 1 is wanted.")
-        if not bool(attributes["rotation"].detach().abs().amax(1).all()):
-            raise Problem("rasterise: a rotation is 0, 0, 0, 0, which turns nothing anywhere.")
+    if not g:
+        return
+    given = {name: tensor.detach() for name, tensor in attributes.items()}
+    # A sum is not finite as soon as one value is not, and costs a fifth of testing each; all are asked for at once,
+    # because a GPU has done nothing else by the time it answers.
+    range_of = given["opacity"].aminmax()
+    turned = given["rotation"].abs().amax(1).amin()
+    *sums, low, high, turned = torch.stack([*(t.sum() for t in given.values()), *range_of, turned]).tolist()
+    for (name, tensor), total in zip(given.items(), sums, strict=True):
+        bad = [] if math.isfinite(total) else (~torch.isfinite(tensor).reshape(g, -1).all(1)).nonzero().ravel()
+        if len(bad):
+            raise Problem(f"rasterise: {name} is not finite for {len(bad)} of {g} Gaussians, first {int(bad[0])}.")
+    if low < 0 or high > 1:
+        raise Problem(f"rasterise: opacity runs from {low:g} to {high:g}, and 0 to 1 is wanted.")
+    if not turned:
+        raise Problem("rasterise: a rotation is 0, 0, 0, 0, which turns nothing anywhere.")

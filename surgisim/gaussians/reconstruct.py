@@ -21,10 +21,12 @@ from surgisim.artifacts.scene import Scene
 from surgisim.config.reconstruction import Reconstruction
 from surgisim.deformation.field import Field, deform, save_field
 from surgisim.gaussians.attributes import drawn
+from surgisim.gaussians.engine_gsplat import lacking
 from surgisim.gaussians.fit import Fit, Say
 from surgisim.gaussians.initialise import initialise
 from surgisim.gaussians.observations import observe
 from surgisim.gaussians.rasterise import render, to_bytes
+from surgisim.problem import Problem
 
 
 @dataclass(frozen=True)
@@ -47,9 +49,15 @@ def reconstruct(
 ) -> Reconstructed:
     """Fit scene and field to the frames that are not held out between used ones.
 
-    The same inputs, settings and number of threads give the same bytes. Raises Problem for inputs that are not of one
+    On the CPU the same inputs, settings and number of threads give the same bytes. Raises Problem for inputs that are not of one
     clip, for frames without tissue, and when a number is no longer finite (naming iteration and frame).
     """
+    missing = lacking() if settings.device == "cuda" else ""
+    if missing:
+        raise Problem(
+            f"reconstruction: 'device' is cuda, which needs {missing}; this machine lacks it. Install it, or set "
+            "reconstruction.device to cpu."
+        )
     seen = observe(frames, inpainted, masks, depth, settings)
     start = initialise(
         inpainted.rgb[seen.frame],
@@ -64,7 +72,7 @@ def reconstruct(
         fit = Fit(start, seen, camera, len(frames.rgb), settings)
         history = fit.run(progress)
         scene, field = fit.result()
-        rgb = np.stack([picture(scene, field, camera, t) for t in range(len(frames.rgb))])
+        rgb = np.stack([picture(scene, field, camera, t, settings.device) for t in range(len(frames.rgb))])
     return Reconstructed(scene, save_field(field, history), Frames(rgb, frames.split))
 
 
@@ -81,6 +89,6 @@ def threads(count: int) -> Iterator[None]:
         numba.set_num_threads(before[1])
 
 
-def picture(scene: Scene, field: Field, camera: Camera, frame: int) -> np.ndarray:
+def picture(scene: Scene, field: Field, camera: Camera, frame: int, device: str = "cpu") -> np.ndarray:
     """A frame of the clip, re-rendered, sRGB 0-255, (H, W, 3) uint8."""
-    return to_bytes(render(*drawn(deform(scene, field, frame / camera.fps)), camera).rgb)
+    return to_bytes(render(*drawn(deform(scene, field, frame / camera.fps)), camera, device=device).rgb)

@@ -4,6 +4,8 @@ import pytest
 import torch
 
 from surgisim.deformation.planes import SPACE, Layout, features
+from surgisim.deformation.sheets import Sheets
+from surgisim.deformation.smoothness import roughness
 
 SIZES = np.array([[4, 5, 3, 4], [7, 6, 4, 9]])
 
@@ -82,3 +84,20 @@ def test_the_number_of_threads_changes_no_byte(planes):
         grads.append((a.grad.numpy().tobytes(), b.grad.numpy().tobytes()))
     numba.set_num_threads(before)
     assert len(set(grads)) == 1
+
+
+def test_sheets_hold_the_planes_and_are_read_and_smoothed_as_they_are(planes):
+    layout, flat, where = planes
+    where = torch.cat([where, where * 3 - 1])
+    sheets = Sheets(layout, flat)
+    torch.testing.assert_close(sheets.unpack(sheets.pack(flat)), flat, rtol=0, atol=0)
+    slope = torch.tensor(np.random.default_rng(1).standard_normal((80, layout.features)))
+    for time in (0.0, 0.37, 1.0):
+        a, b = flat.clone().requires_grad_(), where.clone().requires_grad_()
+        value, (space, later) = features(a, b, time, layout), roughness(a, layout)
+        ((value * slope).sum() + 2 * space + 3 * later).backward()
+        c, d = sheets.pack(flat).requires_grad_(), where.clone().requires_grad_()
+        mine, (space, later) = sheets.features(c, d, time), sheets.roughness(c)
+        ((mine * slope).sum() + 2 * space + 3 * later).backward()
+        for found, wanted in ((mine, value), (sheets.unpack(c.grad), a.grad), (d.grad, b.grad)):
+            torch.testing.assert_close(found, wanted, rtol=1e-10, atol=1e-12)

@@ -6,6 +6,7 @@ import torch
 
 from surgisim.deformation.field import displace, load_field
 from surgisim.gaussians.densify import ATTRIBUTES
+from surgisim.gaussians.engine_gsplat import lacking
 from surgisim.gaussians.reconstruct import reconstruct
 from surgisim.gaussians.schedule import PHASES
 from surgisim.problem import Problem
@@ -26,6 +27,24 @@ def test_frames_never_shown_are_predicted(clip, done):
     assert held.sum() == 2
     wrong = (done.rendered.rgb[held] / 255 - clip.inpainted.rgb[held] / 255)[clip.masks.tissue[held]]
     assert -10 * np.log10(np.mean(wrong**2)) > 30
+
+
+@pytest.mark.skipif(bool(lacking()), reason=f"gsplat needs {lacking()}")
+def test_on_a_gpu_the_scene_is_as_good(clip, done):
+    there = reconstruct(*parts(clip, settings=clip.settings.model_copy(update={"device": "cuda"})))
+    held = clip.frames.split == 1
+
+    def psnr(result):
+        wrong = (result.rendered.rgb[held] / 255 - clip.inpainted.rgb[held] / 255)[clip.masks.tissue[held]]
+        return -10 * np.log10(np.mean(wrong**2))
+
+    assert psnr(there) > psnr(done) - 0.5
+
+
+@pytest.mark.skipif(not lacking(), reason="this machine can run gsplat")
+def test_without_a_gpu_the_setting_is_named(clip):
+    with pytest.raises(Problem, match=r"'device' is cuda, which needs .* set reconstruction.device to cpu"):
+        reconstruct(*parts(clip, settings=clip.settings.model_copy(update={"device": "cuda"})))
 
 
 def test_the_planted_motion_is_recovered(clip, done):
