@@ -1,7 +1,7 @@
 """All feature planes side by side, as a GPU reads and smooths them: a few large steps instead of many small ones.
 
-    sheets (6 L, C, H, W): the space planes xy, xz, yz of every scale, then the time planes xt, yt, zt of every scale, each
-    in the corner of a sheet that holds the largest of them
+    sheets (6 L, C, H, W): the space planes xy, xz, yz of every scale, then the time planes xt, yt, zt of every scale,
+    each in the corner of a sheet that holds the largest of them
 
 Numbers outside of a plane's corner count for nothing. See `planes` for the equations.
 """

@@ -62,7 +62,8 @@ def _part(adam: Adam, fresh: torch.Tensor, first: int) -> None:
     """Move the two parts of each split Gaussian apart along its longest axis and shrink them."""
     mean, scale, rotation = (adam.tensors[name] for name in ("mean", "scale", "rotation"))
     axis = scale[fresh].argmax(1)
-    offset = _axes(rotation[fresh])[torch.arange(len(axis), device=axis.device), :, axis] * scale[fresh].amax(1, keepdim=True).exp() * 0.5
+    along = _axes(rotation[fresh])[torch.arange(len(axis), device=axis.device), :, axis]
+    offset = along * scale[fresh].amax(1, keepdim=True).exp() * 0.5
     side = torch.where(fresh.nonzero()[:, 0] < first, 1.0, -1.0)[:, None]
     mean[fresh] += side * offset
     scale[fresh] -= math.log(SHRINK)

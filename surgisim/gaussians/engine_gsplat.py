@@ -8,10 +8,12 @@ Gaussian that would bring T below 1e-4 is left out. It builds its kernels with n
 import importlib.util
 import shutil
 
+import numpy as np
 import torch
 
 from surgisim.artifacts.camera import Camera
 from surgisim.gaussians.projection import LOW_PASS
+from surgisim.gaussians.rasterise import Image
 from surgisim.problem import Problem
 
 
@@ -51,18 +53,28 @@ def rasterise(
 
 def draw_covariances(
     mean: torch.Tensor, covariance: torch.Tensor, opacity: torch.Tensor, color: torch.Tensor, camera: Camera
-) -> torch.Tensor:
-    """(H, W, 3) of Gaussians (G, 3) [m] with covariances (G, 3, 3) [m^2]; all float32 on the CUDA device."""
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Colour, (H, W, 3), and alpha, (H, W), of Gaussians (G, 3) [m] with covariances (G, 3, 3) [m^2]; all float32 on
+    the CUDA device."""
     from gsplat import rasterization
 
     lens = mean.new_tensor(camera.matrix)
     lens[:2, 2] += 0.5
     with torch.no_grad():
-        image, _, _ = rasterization(
+        image, alpha, _ = rasterization(
             mean, None, None, opacity, color, torch.eye(4, device=mean.device)[None], lens[None], camera.width,
             camera.height, eps2d=LOW_PASS, packed=False, covars=covariance,
         )  # fmt: skip
-    return image[0]
+    return image[0], alpha[0, ..., 0]
+
+
+def render_covariances(
+    mean: np.ndarray, covariance: np.ndarray, opacity: np.ndarray, color: np.ndarray, camera: Camera
+) -> Image:
+    """`draw_covariances` for numpy arrays; without depth and weights, which are None."""
+    arrays = (np.ascontiguousarray(a, np.float32) for a in (mean, covariance, opacity, color))
+    rgb, alpha = draw_covariances(*(torch.as_tensor(a, device="cuda") for a in arrays), camera)
+    return Image(rgb.cpu().numpy(), None, alpha.cpu().numpy(), None)
 
 
 def lacking() -> str:

@@ -49,8 +49,9 @@ def reconstruct(
 ) -> Reconstructed:
     """Fit scene and field to the frames that are not held out between used ones.
 
-    On the CPU the same inputs, settings and number of threads give the same bytes. Raises Problem for inputs that are not of one
-    clip, for frames without tissue, and when a number is no longer finite (naming iteration and frame).
+    On the CPU the same inputs, settings and number of threads give the same bytes. Raises Problem for inputs that are
+    not of one clip, for frames without tissue, where the device is missing, and when a number is no longer finite
+    (naming iteration and frame).
     """
     missing = lacking() if settings.device == "cuda" else ""
     if missing:

@@ -10,6 +10,7 @@ from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.scene import Scene
 from surgisim.gaussians.attributes import drawn
+from surgisim.gaussians.engine_gsplat import lacking, render_covariances
 from surgisim.gaussians.rasterise import Image, render, to_bytes
 from surgisim.mpm.carried import Carried
 from surgisim.mpm.nodes import Nodes
@@ -30,19 +31,27 @@ class Light(Protocol):
 class Splats:
     """Gaussians bound to a body."""
 
-    def __init__(self, mean, rotation, scale, opacity, color, simulator: Nodes, shade: Shade | None = None) -> None:
+    def __init__(
+        self, mean, rotation, scale, opacity, color, simulator: Nodes, shade: Shade | None = None, device: str = "cpu"
+    ) -> None:
+        """device: where they are drawn; on 'cuda' only where gsplat is there."""
         self.carried, self.opacity, self.color, self.shade = Carried(mean, simulator), opacity, color, shade
+        self.on_gpu = device == "cuda" and not lacking()
         turn = Rotation.from_quat(np.asarray(rotation, float), scalar_first=True).as_matrix()
         self.factor = turn * np.asarray(scale, float)[:, None, :]
 
     def seen(self, u: np.ndarray, camera: Camera) -> Image:
         """The image at displacements of the solid nodes [m], (A, 3)."""
         mean, F = self.carried.at(u)
-        # A splat's covariance M M^T becomes (F M)(F M)^T; its axes are the left singular vectors.
-        axes, radii, _ = np.linalg.svd(F @ self.factor)
+        color = self.color if self.shade is None else self.shade(mean, F)
+        # A splat's covariance M M^T becomes (F M)(F M)^T.
+        factor = F @ self.factor
+        if self.on_gpu:
+            return render_covariances(mean, factor @ factor.transpose(0, 2, 1), self.opacity, color, camera)
+        # Its axes are the left singular vectors.
+        axes, radii, _ = np.linalg.svd(factor)
         axes = axes * np.sign(np.linalg.det(axes))[:, None, None]
         rotation = Rotation.from_matrix(axes).as_quat(scalar_first=True)
-        color = self.color if self.shade is None else self.shade(mean, F)
         return render(mean, rotation, np.maximum(radii, 1e-7), self.opacity, color, camera)
 
 
@@ -50,14 +59,15 @@ class Drawn:
     """The scene, and behind it, where it opens, the body's interior and what lies beyond the picture's edge."""
 
     def __init__(
-        self, scene: Scene, rim: Scene, body: Body, simulator: Nodes, interior: bool, light: Light | None = None
-    ) -> None:
+        self, scene: Scene, rim: Scene, body: Body, simulator: Nodes, interior: bool, light: Light | None = None,
+        device: str = "cpu",
+    ) -> None:  # fmt: skip
         """rim: see `gaussians.rim`; light: None leaves every colour as the rest frame has it."""
         shade = (lambda mean, color: None) if light is None else light.shade
         front, behind = drawn(scene), drawn(rim)
         if interior:
             behind = [np.concatenate(pair) for pair in zip(behind, _inside(body), strict=True)]
-        self.front, self.behind = (Splats(*s, simulator, shade(s[0], s[-1])) for s in (front, behind))
+        self.front, self.behind = (Splats(*s, simulator, shade(s[0], s[-1]), device) for s in (front, behind))
 
     def picture(self, u: np.ndarray, camera: Camera) -> np.ndarray:
         """The frame at displacements of the solid nodes [m], (A, 3), as (H, W, 3) uint8."""

@@ -48,7 +48,7 @@ class Live:
         u = wp.to_torch(displacement)[self.index]
         mean = self.mean + torch.einsum("gk,gka->ga", self.weight, u)
         F = self.eye + torch.einsum("gka,gkb->gab", u, self.slope)
-        seen = draw_covariances(mean, F @ self.covariance @ F.transpose(1, 2), self.opacity, self.color, camera)
+        seen, _ = draw_covariances(mean, F @ self.covariance @ F.transpose(1, 2), self.opacity, self.color, camera)
         return (255 * seen.clamp(0, 1)).round().to(torch.uint8)
 
 

@@ -74,7 +74,7 @@ def replay(
             recorded = whole.run(theta, path).u
 
         def picture(light: Light, u: np.ndarray) -> np.ndarray:
-            return Drawn(scene, rim, body, whole, settings.interior, light).picture(u, camera)
+            return Drawn(scene, rim, body, whole, settings.interior, light, settings.device).picture(u, camera)
 
         light = find_light(scene, camera, body.spacing, whole, recorded, *recording, picture)
         progress(0.5, 1.0, f"lamp: {light.words}")
@@ -189,7 +189,7 @@ class _Look:
             if term.energy:
                 self.laws.append((term.energy, values))
         if settings.render:
-            self.drawn = Drawn(*scenes, body, simulator, settings.interior, light)
+            self.drawn = Drawn(*scenes, body, simulator, settings.interior, light, settings.device)
 
     def measure(self, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, float, tuple[float, float]]:
         """Particle positions [m], (P, 3); smallest det F; kinetic and elastic energy [J]."""
