@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from surgisim.estimation.gauss_newton import Solution, derivative
-from surgisim.estimation.otherwise import Otherwise, on_no_grid, settled
+from surgisim.estimation.otherwise import STEPS, Otherwise, on_no_grid, settled
 from surgisim.estimation.rounds import number, plain
 from surgisim.estimation.trial import WORKERS, Trial
 from surgisim.mpm.simulator import Breakdown
@@ -32,7 +32,9 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
     change = on_no_grid(fine, solution.x)[0] - on_no_grid(trial, solution.x)[0]
     begin = np.clip(solution.x - change, *wanted.bounds)
     say(0.0, 1.0, "on a finer grid")
-    found = settled(Otherwise("finer grid", alone, begin=begin), solution)
+    # Where nothing tells the pace it is only asked how far a grid is off: the way of one step says that.
+    steps = STEPS if trial.eased is None else 1
+    found = settled(Otherwise("finer grid", alone, begin=begin), solution, steps=steps)
     if found.residual is None:
         # A finer grid follows a sharper fold, and can turn inside out where a wider one does not.
         history.append({"round": "finer grid", "cost": None, "broke": BROKE})

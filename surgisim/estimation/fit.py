@@ -166,7 +166,7 @@ def estimate(
     searched = settings.enabled and bool(wanted.free)
     if searched:
         begun = x
-        trial, x = settle_pull(edges, begun, phase, history, progress)
+        trial, x, _ = settle_pull(edges, begun, phase, history, progress)
         rim = seen_rim(tracks, motion, camera, body.spacing) if settings.seen_rim and trial.laying else None
         piece = seen_piece(trial.laying.columns, tracks, motion) if settings.pieces and trial.laying else None
         trial, x = ask_hold(trial, x, begun, rim, piece, phase, history, progress)

@@ -8,7 +8,7 @@ import numpy as np
 
 from surgisim.estimation.pieces import Piece
 from surgisim.estimation.rim import Rim
-from surgisim.estimation.rounds import cost_until, last_driven, number, settle_pull
+from surgisim.estimation.rounds import HEATS, RIVALS, cost_until, last_driven, number, settle_pull
 from surgisim.estimation.trial import Trial, at_once
 
 MOVED = 0.9
@@ -51,14 +51,18 @@ def ask_hold(
     if least >= without:
         return trial, x
     # The shape was fitted to a body that is held: another has to be fitted before they can be compared.
-    fits = {}
+    fits, shared = {}, None
     for name in kinds:
         grip = min(grips, key=lambda grip, name=name: begins[name, grip][0])
         c, begin = begins[name, grip]
         if not c <= WORTH[name] * least:
             continue
-        best, there = settle_pull([ways[name, grip]], begin, phase, history, say)
+        best, there, jacobian = settle_pull([ways[name, grip]], begin, phase, history, say, shared, HEATS[0])
+        shared = jacobian if shared is None else shared
         cost = cost_until((best, there), last=last)
+        if cost <= RIVALS * without:
+            best, there, _ = settle_pull([best], there, phase, history, say, jacobian)
+            cost = cost_until((best, there), last=last)
         history.append({"round": "hold", "as": name, "without": number(without), "cost": number(cost)})
         fits[name] = cost, best, there
     chosen, least = (trial, x), without

@@ -281,13 +281,14 @@ def _weights(r: np.ndarray) -> np.ndarray:
 
 
 def settled(
-    one: Otherwise, solution: Solution, worker: int = 0, enough: float = ENOUGH, near: float = np.inf
-) -> Answer:
+    one: Otherwise, solution: Solution, worker: int = 0, enough: float = ENOUGH, near: float = np.inf,
+    steps: int = STEPS,
+) -> Answer:  # fmt: skip
     """Where a fit near a solution lies otherwise, by a few steps of the derivative that was taken there.
 
     Each step corrects the derivative by what it met (Broyden's update, as in `gauss_newton`). enough: the share of the
     cost that a step must win for another. near: a cost that as many more steps as are left, each as good as the last
-    one, must reach, or none is made.
+    one, must reach, or none is made. steps: most of them.
     """
     trial, wanted, J = one.trial, one.trial.wanted, solution.jacobian
     x = solution.x if one.begin is None else one.begin
@@ -295,7 +296,7 @@ def settled(
     if r is None:
         return Answer(one, x, r, np.inf, J)
     cost, damping, gained = cost_of(r, x, wanted), 0.01, np.inf
-    for left in reversed(range(STEPS)):
+    for left in reversed(range(steps)):
         w = _weights(r)
         hessian = (J * w[:, None]).T @ J + np.diag(1 / wanted.spread**2)
         g = J.T @ (w * r) + (x - wanted.start) / wanted.spread**2

@@ -151,9 +151,11 @@ def cost_until(job: tuple[Trial, np.ndarray], worker: int = 0, *, last: int) -> 
 
 
 def settle_pull(
-    trials: list[Trial], x: np.ndarray, phase: np.ndarray, history: list, say: Say
-) -> tuple[Trial, np.ndarray]:
-    """Of trials that differ by their edge the one whose pull and hold fit best, and x with their shape fitted to them.
+    trials: list[Trial], x: np.ndarray, phase: np.ndarray, history: list, say: Say, jacobian: np.ndarray | None = None,
+    iterations: int = HEATS[1],
+) -> tuple[Trial, np.ndarray, np.ndarray | None]:  # fmt: skip
+    """Of trials that differ by their edge the one whose pull and hold fit best, x with their shape fitted to them, and
+    the derivative by what was fitted there, (R, N); None if there is none.
 
     How an edge fits before the shape is fitted with it says nothing: of family 31415's clip 17 the five edges' misfits
     were 2862 to 3605 then, and 828 to 1540 after, in another order.
@@ -161,14 +163,15 @@ def settle_pull(
     All is fitted but moduli, viscosities and moments of release: displacement-driven tissue takes its shape whatever
     its modulus, which only a release tells; where the shape is off, a release misfits by more than any modulus could
     mend, and the wrong one looks as good as the right one. The first trial and x where there is nothing to fit.
+    jacobian: such a derivative, of a body that is held a little otherwise; iterations: of the best two.
     """
     wanted = trials[0].wanted
     last = _shown(trials[0], phase)
     slow = np.array([not name.endswith((".E", ".eta", ".release")) for name in wanted.names])
     if not last or not slow.any() or slow.all():
-        return trials[0], x
+        return trials[0], x, jacobian
     # One alone needs no first heat.
-    heats = [(len(trials), HEATS[0]), (FINALISTS, HEATS[1])][len(trials) < 2 :]
+    heats = [(len(trials), HEATS[0]), (FINALISTS, iterations)][len(trials) < 2 :]
     work, done = sum(entrants * iterations for entrants, iterations in heats), 0
 
     def settled(
@@ -188,7 +191,7 @@ def settle_pull(
             return np.inf, trial, begin, jacobian
         return cost_of(found.residual, found.x, wanted), trial, found.x, found.jacobian
 
-    field: list[tuple[float, Trial, np.ndarray, np.ndarray | None]] = [(0.0, trial, x, None) for trial in trials]
+    field: list[tuple[float, Trial, np.ndarray, np.ndarray | None]] = [(0.0, trial, x, jacobian) for trial in trials]
     for entrants, iterations in heats:
         run, shared = [], None
         for _, trial, begin, own in field[:entrants]:
@@ -197,7 +200,7 @@ def settle_pull(
             shared = run[-1][-1] if shared is None else shared
             done += iterations
         field = sorted(run, key=lambda one: one[0])
-    return field[0][1:3]
+    return field[0][1:]
 
 
 def _some(

@@ -15,6 +15,7 @@ class Breaking:
 
     laying: SimpleNamespace
     wanted: SimpleNamespace
+    eased: float | None = None
 
     def residual(self, x, worker):
         return None
@@ -53,3 +54,29 @@ def test_a_field_is_as_many_times_stiffer_at_the_same_place_on_another_grid():
     at = {E: {"corotated": {"E": E}} for E in (1000.0, 900.0)}
     brought = fit._brought(field, coarse, at[1000.0], fine, at[900.0])
     assert brought.tolist() == [[1800.0, 0.0], [1800.0, 0.0], [450.0, 0.0]]
+
+
+@dataclass(frozen=True)
+class Bowl:
+    """A trial whose finer grid wants another x, which a derivative as wrong as this one finds in several steps."""
+
+    laying: SimpleNamespace
+    wanted: SimpleNamespace
+    eased: float | None
+    runs: list
+
+    def residual(self, x, worker):
+        self.runs.append(x.copy())
+        return 3.0 * (x - 0.5)
+
+
+def test_what_nothing_tells_the_pace_of_takes_one_step_on_a_finer_grid(monkeypatch):
+    monkeypatch.setattr(finer, "on_no_grid", lambda trial, x: (np.zeros(2), np.zeros((2, 2))))
+    laying = SimpleNamespace(finer=lambda times: SimpleNamespace(shared=lambda threads: None))
+    bounds = np.full(2, -9.0), np.full(2, 9.0)
+    wanted = SimpleNamespace(bounds=bounds, spread=np.full(2, 9.0), start=np.zeros(2), free=[], open=[])
+    wanted.values = lambda x: {}
+    trial = Bowl(laying, wanted, 0.0, [])
+    _, there = finer.finely(trial, Solution(np.ones(2), np.full(2, 1.5), 4 * np.eye(2)), [], lambda *_: None)
+    assert len(trial.runs) == 2
+    assert np.all(there.x < 1.0)

@@ -38,7 +38,11 @@ def test_the_edge_that_fits_best_in_the_end_is_kept():
     near, right = edge(0.0, 0.7), edge(-0.1, 0.3)
     assert np.linalg.norm(near.residual(WANTED.start)) < np.linalg.norm(right.residual(WANTED.start))
     history, told = [], []
-    trial, x = settle_pull([near, right], WANTED.start, PHASE, history, lambda done, of, what: told.append(done / of))
+
+    def say(done, of, what):
+        told.append(done / of)
+
+    trial, x, _ = settle_pull([near, right], WANTED.start, PHASE, history, say)
     assert trial is right
     assert x[NU] - WANTED.start[NU] == pytest.approx(-0.1, abs=0.02)
     assert np.delete(x, NU) == pytest.approx(np.delete(WANTED.start, NU))
@@ -54,7 +58,7 @@ def test_one_that_cannot_be_simulated_is_left_out():
         raise Breakdown("turned inside out")
 
     broken.residual = broken.together = breaks
-    trial, _ = settle_pull([broken, right], WANTED.start, PHASE, [], lambda *_: None)
+    trial, *_ = settle_pull([broken, right], WANTED.start, PHASE, [], lambda *_: None)
     assert trial is right
 
 
@@ -72,6 +76,6 @@ def test_a_derivative_is_taken_on_the_first_edge_and_corrected_on_the_others():
 
     for k in range(3):
         counted(k)
-    _, x = settle_pull(edges, WANTED.start, PHASE, [], lambda *_: None)
+    _, x, _ = settle_pull(edges, WANTED.start, PHASE, [], lambda *_: None)
     assert asked[1] < asked[0]
     assert x[NU] - WANTED.start[NU] == pytest.approx(-0.05, abs=0.02)
