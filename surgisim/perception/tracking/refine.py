@@ -92,15 +92,16 @@ def _unlit(slope: np.ndarray, value: np.ndarray, weight: np.ndarray) -> np.ndarr
     """The part of `slope` (K, N, 2) that no gain or offset of the brightness can mimic."""
     total = weight.sum(-1, keepdims=True) + 1e-6
     a = value - (weight * value).sum(-1, keepdims=True) / total
-    free = slope - (np.einsum("kn,kni->ki", weight, slope) / total)[:, None]
-    share = np.einsum("kn,kni->ki", weight * a, free) / ((weight * a * a).sum(-1) + 1e-6)[:, None]
-    return free - a[..., None] * share[:, None]
+    free = slope - weight[:, None] @ slope / total[..., None]
+    share = (weight * a)[:, None] @ free / ((weight * a * a).sum(-1) + 1e-6)[:, None, None]
+    return free - a[..., None] * share
 
 
 def _solve(slope: np.ndarray, rest: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Least-squares shift (K, 2) that explains `rest`, and its standard deviation (K,)."""
-    pull = np.einsum("kn,kni,knj->kij", weight, slope, slope) + 1e-3 * np.eye(2)
-    push = np.einsum("kn,kni,kn->ki", weight, slope, rest)
+    weighted = (weight[..., None] * slope).transpose(0, 2, 1)
+    pull = weighted @ slope + 1e-3 * np.eye(2)
+    push = (weighted @ rest[..., None])[..., 0]
     inverse = np.linalg.inv(pull)
     noise = (weight * rest**2).sum(-1) / (weight.sum(-1) + 1e-6)
     worst = np.linalg.eigvalsh(inverse)[:, 1]
