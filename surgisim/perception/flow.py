@@ -6,6 +6,7 @@ ECCV 2016) as OpenCV has it.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import Lock
 
 import cv2
 import numpy as np
@@ -64,12 +65,24 @@ def _grey(frame: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(frame if frame.ndim == 2 else cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY))
 
 
+class _Threads:
+    """OpenCV's own, which are the same for all that runs beside it."""
+
+    lock, searches, before = Lock(), 0, 1
+
+
 @contextmanager
 def _one_thread() -> Iterator[None]:
     # The search walks in one stripe per thread, so its result would depend on the number of cores.
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
+    with _Threads.lock:
+        if not _Threads.searches:
+            _Threads.before = cv2.getNumThreads()
+            cv2.setNumThreads(1)
+        _Threads.searches += 1
     try:
         yield
     finally:
-        cv2.setNumThreads(before)
+        with _Threads.lock:
+            _Threads.searches -= 1
+            if not _Threads.searches:
+                cv2.setNumThreads(_Threads.before)

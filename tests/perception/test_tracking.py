@@ -144,16 +144,15 @@ def _stage(sheet):
     return frames, masks, depth, sheet.camera
 
 
-def test_a_point_that_is_not_recognised_is_carried_on_from_where_it_was(monkeypatch):
+def test_a_point_that_is_not_recognised_is_carried_on_from_where_it_was():
     queries = np.array([[10.0, 12.0], [20.0, 8.0]])
     x, y = np.meshgrid(np.arange(32.0), np.arange(24.0))
     place = np.stack([x + 3, y + 1], -1).astype(np.float32)
     warp = Warp(place, np.ones((24, 32), bool), np.full((24, 32), 0.1, np.float32))
     nothing, last = np.zeros((24, 32), bool), np.array([[0.4, -0.2], [0.1, 0.3]])
     found = Found(np.array([[0.2, 0.0], [0.2, 0.0]]), np.array([0.1, 0.1]), np.array([0.9, 0.5]))
-    monkeypatch.setattr(flow_chain, "find", lambda *_: found)
     patches = SimpleNamespace(queries=queries)
-    xy, visible, _, shift = flow_chain._place(patches, warp, np.zeros((24, 32), np.float32), nothing, nothing, last)
+    xy, visible, _, shift = flow_chain._place(patches, warp, found, nothing, last)
     assert visible.all()
     assert xy == pytest.approx(queries + (3, 1) + [[0.2, 0.0], [0.1, 0.3]], abs=1e-4)
     assert shift == pytest.approx(np.array([[0.2, 0.0], [0.1, 0.3]]))

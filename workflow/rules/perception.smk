@@ -38,6 +38,7 @@ rule masking:
         "benchmarks/{clip}/{variant}/masking.tsv"
     conda:
         "../../envs/perception.yaml"
+    threads: 4
     resources:
         mem_mb=3000,
         gpu=0,
@@ -117,6 +118,7 @@ rule tracking:
         "benchmarks/{clip}/{variant}/tracking.tsv"
     conda:
         "../../envs/perception.yaml"
+    threads: 4
     resources:
         mem_mb=3000,
         gpu=0,

@@ -6,11 +6,12 @@ import cv2
 import numpy as np
 
 from surgisim.perception.flow import dense_flow
+from surgisim.perception.side_by_side import in_order
 
 
 def frame_flow(rgb: np.ndarray) -> np.ndarray:
     """Flow of each frame to the next [px], (T - 1, H, W, 2) float32."""
-    return np.stack([dense_flow(a, b) for a, b in pairwise(rgb)])
+    return np.stack(list(in_order(dense_flow, pairwise(rgb))))
 
 
 def distance(tool: np.ndarray, xy: np.ndarray) -> np.ndarray:

@@ -5,6 +5,8 @@ the clip; then the clip's own colours of instrument and tissue, in a few rounds;
 frames along the optical flow. Points marked by the user count for more than any colour.
 """
 
+from itertools import pairwise
+
 import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -17,6 +19,7 @@ from surgisim.perception.flow import agrees, carry, dense_flow
 from surgisim.perception.masking.appearance import OFFSET, features, highlights, lit
 from surgisim.perception.masking.settling import settled
 from surgisim.perception.masking.shape import bridged, entering, snapped, solid
+from surgisim.perception.side_by_side import in_order
 
 BINS = 24
 LOW, HIGH = np.array([-0.7, -1.0, 2.0]), np.array([1.2, 1.0, 5.6])
@@ -44,7 +47,7 @@ def tool(frames: Frames, given: Given, settings: Masking, progress) -> tuple[np.
     prior = _by_redness(seen) + marked
 
     def regions(evidence: np.ndarray) -> np.ndarray:
-        smooth = [settled(f, e) for f, e in zip(rgb, evidence, strict=True)]
+        smooth = list(in_order(settled, zip(rgb, evidence, strict=True)))
         whole = np.stack([solid(s > 0, p) for s, p in zip(smooth, prior, strict=True)]) & inside
         found = entering(whole, prior, shine, marked > 6)
         return np.stack([bridged(m, s) for m, s in zip(found, smooth, strict=True)]) & inside & (marked > -6)
@@ -106,10 +109,14 @@ def _by_colour(bins: np.ndarray, found: np.ndarray, inside: np.ndarray) -> np.nd
 
 def _motion(rgb: np.ndarray, progress) -> list[tuple[np.ndarray, np.ndarray]]:
     """Flow t -> t + 1 and t + 1 -> t for each t [px]."""
+
+    def both(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return dense_flow(one, other), dense_flow(other, one)
+
     pairs = []
-    for t in range(len(rgb) - 1):
-        progress(0.5 * t, len(rgb), "following what moves")
-        pairs.append((dense_flow(rgb[t], rgb[t + 1]), dense_flow(rgb[t + 1], rgb[t])))
+    for pair in in_order(both, pairwise(rgb)):
+        progress(0.5 * len(pairs), len(rgb), "following what moves")
+        pairs.append(pair)
     return pairs
 
 

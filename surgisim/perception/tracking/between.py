@@ -19,7 +19,7 @@ def sample(image: np.ndarray, at: np.ndarray) -> np.ndarray:
     return _linear(np.ascontiguousarray(image, np.float32), where).reshape(*at.shape[:-1], image.shape[2])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _cubic(image, at):
     height, width = image.shape
     out = np.empty(len(at), np.float32)
@@ -49,7 +49,7 @@ def _weights(t, w):
     w[3] = (0.5 * t - 0.5) * t * t
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _linear(image, at):
     height, width, channels = image.shape
     out = np.empty((len(at), channels), np.float32)

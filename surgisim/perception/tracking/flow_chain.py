@@ -11,9 +11,10 @@ import cv2
 import numpy as np
 
 from surgisim.config.tracking import Tracking
+from surgisim.perception.side_by_side import in_order
 from surgisim.perception.tracking import Paths
 from surgisim.perception.tracking.between import sample
-from surgisim.perception.tracking.refine import Templates, find, templates
+from surgisim.perception.tracking.refine import Found, Templates, find, templates
 from surgisim.perception.tracking.warp import Warp, follow_surface
 
 LIKE, STRANGE = 0.7, 0.2
@@ -39,8 +40,13 @@ def track(
     bright = hidden | np.stack([widen(mask, 1) for mask in specular])
     patches = templates(_grey(rgb[0]), queries, bright[0], radius=radius)
     rows, shift = [], np.zeros(queries.shape)
-    for t, warp in enumerate(follow_surface(rgb, hidden, progress=progress)):
-        *row, shift = _place(patches, warp, _grey(rgb[t]), bright[t], hidden[t], shift)
+
+    def seen(t: int, warp: Warp) -> tuple[Warp, Found]:
+        return warp, find(patches, _grey(rgb[t]), warp.position, bright[t])
+
+    surface = enumerate(follow_surface(rgb, hidden, progress=progress))
+    for t, (warp, found) in enumerate(in_order(seen, surface)):
+        *row, shift = _place(patches, warp, found, hidden[t], shift)
         rows.append(row)
     xy, visible, sigma = (np.stack(part, 1) for part in zip(*rows, strict=True))
     return Paths(xy.astype(np.float32), visible, sigma.astype(np.float32))
@@ -53,13 +59,12 @@ def widen(mask: np.ndarray, by: int) -> np.ndarray:
 
 
 def _place(
-    patches: Templates, warp: Warp, grey: np.ndarray, bright: np.ndarray, hidden: np.ndarray, last: np.ndarray
+    patches: Templates, warp: Warp, found: Found, hidden: np.ndarray, last: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Where the points are, whether they are seen, how sure, and their shifts against the warp, (K, 2) [px].
 
     last: their shifts in the frame before: what a warp has wrong in a place it has wrong in the next frame, too.
     """
-    found = find(patches, grey, warp.position, bright)
     error = sample(warp.error, patches.queries[:, None])[:, 0]
     seen = sample(warp.seen.astype(np.float32), patches.queries[:, None])[:, 0] > 0.5
     far = np.linalg.norm(found.shift, axis=-1)

@@ -1,0 +1,29 @@
+"""Frames worked on side by side, where what one of them gives does not depend on the others."""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+
+def in_order(work: Callable[..., Any], items: Iterable[tuple]) -> Iterator[Any]:
+    """work(*item) of every item, in their order, on as many threads as this process may use.
+
+    Items are asked for on the calling thread, a few ahead of what is handed on, so that many large ones need not be
+    kept at once.
+    """
+    count = threads()
+    with ThreadPoolExecutor(count) as pool:
+        waiting = deque()
+        for item in items:
+            waiting.append(pool.submit(work, *item))
+            if len(waiting) > 2 * count:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+
+
+def threads() -> int:
+    """As OMP_NUM_THREADS says, which Snakemake sets for each job; else one for each processor."""
+    return int(os.environ.get("OMP_NUM_THREADS") or len(os.sched_getaffinity(0)))
