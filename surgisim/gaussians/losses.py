@@ -8,6 +8,7 @@ changes.
 import torch
 
 TINY = 1e-20
+"""Keeps the mean over nothing at 0."""
 
 
 def masked_l1(value: torch.Tensor, target: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
