@@ -60,6 +60,7 @@ def ask_hold(
         best, there, jacobian = settle_pull([ways[name, grip]], begin, phase, history, say, shared, HEATS[0])
         shared = jacobian if shared is None else shared
         cost = cost_until((best, there), last=last)
+        # It must be far better than the body as it is held in the end: what is worse after two steps is left.
         if cost <= RIVALS * without:
             best, there, _ = settle_pull([best], there, phase, history, say, jacobian)
             cost = cost_until((best, there), last=last)

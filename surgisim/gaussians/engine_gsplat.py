@@ -72,6 +72,10 @@ def render_covariances(
     mean: np.ndarray, covariance: np.ndarray, opacity: np.ndarray, color: np.ndarray, camera: Camera
 ) -> Image:
     """`draw_covariances` for numpy arrays; without depth and weights, which are None."""
+    if len(mean) == 0:
+        # As in `rasterise`.
+        empty = np.zeros((camera.height, camera.width), np.float32)
+        return Image(np.repeat(empty[..., None], 3, 2), None, empty, None)
     arrays = (np.ascontiguousarray(a, np.float32) for a in (mean, covariance, opacity, color))
     rgb, alpha = draw_covariances(*(torch.as_tensor(a, device="cuda") for a in arrays), camera)
     return Image(rgb.cpu().numpy(), None, alpha.cpu().numpy(), None)

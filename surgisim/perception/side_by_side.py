@@ -25,5 +25,6 @@ def in_order(work: Callable[..., Any], items: Iterable[tuple]) -> Iterator[Any]:
 
 
 def threads() -> int:
-    """As OMP_NUM_THREADS says, which Snakemake sets for each job; else one for each processor."""
-    return int(os.environ.get("OMP_NUM_THREADS") or len(os.sched_getaffinity(0)))
+    """As OMP_NUM_THREADS says (its first number), which Snakemake sets for each job; else one for each processor."""
+    told = os.environ.get("OMP_NUM_THREADS", "").split(",")[0]
+    return int(told) if told else len(os.sched_getaffinity(0))

@@ -10,6 +10,7 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.frames import BETWEEN, Frames
 from surgisim.artifacts.masks import Masks
 from surgisim.artifacts.scene import Scene
+from surgisim.gaussians.engine_gsplat import lacking
 from surgisim.gaussians.rim import beyond
 from surgisim.lighting.highlights import without
 from surgisim.lighting.response import Response
@@ -53,11 +54,11 @@ def played():
     return made.simulator, run.u, scene
 
 
-def picture(played, lamp, u):
+def picture(played, lamp, u, device="cpu"):
     """What the pulled slab by itself looks like under a lamp or under none."""
     simulator, _, scene = played
     nothing = replace(scene, **{name: value[:0] for name, value in vars(scene).items()})
-    return Drawn(scene, nothing, BODY, simulator, False, lamp).picture(u, CAMERA)
+    return Drawn(scene, nothing, BODY, simulator, False, lamp, device).picture(u, CAMERA)
 
 
 def recorded(played, lamp):
@@ -75,6 +76,13 @@ def found(played, lamp, draw=None):
     simulator, states, scene = played
     draw = draw or (lambda lamp, u: picture(played, lamp, u))
     return find_light(scene, CAMERA, BODY.spacing, simulator, states, *recorded(played, lamp), draw)
+
+
+@pytest.mark.skipif(bool(lacking()), reason=f"gsplat needs {lacking()}")
+def test_a_gpu_draws_what_the_cpu_draws(played):
+    for u in (played[1][0], played[1][-1]):
+        there, here = (picture(played, None, u, device).astype(float) for device in ("cuda", "cpu"))
+        assert np.abs(there - here).mean() < 1.0
 
 
 def test_a_lamp_that_was_there_is_found_and_one_that_was_not_is_left_out(played):
