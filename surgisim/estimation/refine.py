@@ -38,8 +38,9 @@ FIRMEST = 8.0
 every step of every run after it shorter."""
 TRIES = 3
 """Steps tried, at most, for each that may be kept."""
-PAYS, OVER = 0.04, 3
-"""Share of the kept frames' misfit that so many steps together must take off, or no more are sought; chosen."""
+PAYS, OVER = 0.1, 3
+"""Share of all that has been taken off the kept frames' misfit that the last so many steps must have taken off, or no
+more are sought; chosen."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,14 @@ def refine(
     free = np.ones((len(theta), 1))
     slope, past = slope_at(at), _Past(partial(_smoothed, pairs=pairs))
     way, rate, tries, pays = past.way(slope, free), 1.0, 0, True
-    while pays and len(history) <= iterations and rate * _size(free * way) >= LEAST and tries < TRIES * iterations:
+    while pays and len(history) <= iterations and tries < TRIES * iterations:
+        if rate * _size(free * way) < LEAST:
+            if not past.steps:
+                break
+            # What the last steps told misleads here: begin anew, straight down.
+            past.forget()
+            way, rate = past.way(slope, free), 1.0
+            continue
         k, tries = len(history), tries + 1
         said = f"refinement {k}/{iterations}, misfit {at.track:.3f}, on kept frames {at.judged:.3f}"
         progress(k, iterations + 1, said)
@@ -146,7 +154,8 @@ def refine(
         at = new
         history.append(_row(k, at))
         best = min(best, at, key=lambda one: one.judged)
-        pays = k < OVER or best.judged <= (1 - PAYS) * min(row["judged"] for row in history[:-OVER])
+        lately = min(row["judged"] for row in history[:-OVER]) - best.judged if k >= OVER else np.inf
+        pays = lately > PAYS * (begun.judged - best.judged)
         if pays and k < iterations:
             slope = slope_at(at)
             past.met(at.s - before.s, slope - steeper)
@@ -175,6 +184,10 @@ class _Past:
             # It became steeper: there is no bottom to step to yet.
             self.steps.clear()
             self.begins = min(MOST, LONGER * _size(step))
+
+    def forget(self) -> None:
+        self.steps.clear()
+        self.begins = BEGINS
 
     def way(self, slope: np.ndarray, free: np.ndarray) -> np.ndarray:
         """The step down from where the slope is this, (P, M); free: share of it that may be made, (P, 1)."""

@@ -13,7 +13,7 @@ import torch
 
 from surgisim.artifacts.camera import Camera
 from surgisim.gaussians.projection import LOW_PASS
-from surgisim.gaussians.rasterise import Image
+from surgisim.gaussians.rasterise import NEAR
 from surgisim.problem import Problem
 
 
@@ -52,8 +52,9 @@ def rasterise(
 
 
 def draw_covariances(
-    mean: torch.Tensor, covariance: torch.Tensor, opacity: torch.Tensor, color: torch.Tensor, camera: Camera
-) -> tuple[torch.Tensor, torch.Tensor]:
+    mean: torch.Tensor, covariance: torch.Tensor, opacity: torch.Tensor, color: torch.Tensor, camera: Camera,
+    near: float = NEAR,
+) -> tuple[torch.Tensor, torch.Tensor]:  # fmt: skip
     """Colour, (H, W, 3), and alpha, (H, W), of Gaussians (G, 3) [m] with covariances (G, 3, 3) [m^2]; all float32 on
     the CUDA device."""
     from gsplat import rasterization
@@ -63,22 +64,22 @@ def draw_covariances(
     with torch.no_grad():
         image, alpha, _ = rasterization(
             mean, None, None, opacity, color, torch.eye(4, device=mean.device)[None], lens[None], camera.width,
-            camera.height, eps2d=LOW_PASS, packed=False, covars=covariance,
+            camera.height, near_plane=near, eps2d=LOW_PASS, packed=False, covars=covariance,
         )  # fmt: skip
     return image[0], alpha[0, ..., 0]
 
 
-def render_covariances(
-    mean: np.ndarray, covariance: np.ndarray, opacity: np.ndarray, color: np.ndarray, camera: Camera
-) -> Image:
-    """`draw_covariances` for numpy arrays; without depth and weights, which are None."""
+def draw_factors(
+    mean: np.ndarray, factor: np.ndarray, opacity: np.ndarray, color: np.ndarray, camera: Camera, near: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """As engine_numba's, drawn on the CUDA device."""
     if len(mean) == 0:
         # As in `rasterise`.
         empty = np.zeros((camera.height, camera.width), np.float32)
-        return Image(np.repeat(empty[..., None], 3, 2), None, empty, None)
-    arrays = (np.ascontiguousarray(a, np.float32) for a in (mean, covariance, opacity, color))
-    rgb, alpha = draw_covariances(*(torch.as_tensor(a, device="cuda") for a in arrays), camera)
-    return Image(rgb.cpu().numpy(), None, alpha.cpu().numpy(), None)
+        return np.repeat(empty[..., None], 3, 2), empty
+    place, factor, opacity, color = (torch.as_tensor(a, device="cuda") for a in (mean, factor, opacity, color))
+    rgb, alpha = draw_covariances(place, factor @ factor.mT, opacity, color, camera, near)
+    return rgb.cpu().numpy(), alpha.cpu().numpy()
 
 
 def lacking() -> str:

@@ -5,7 +5,7 @@ import torch
 
 from surgisim.artifacts.camera import Camera
 from surgisim.gaussians.blending import blend, blend_back, gather
-from surgisim.gaussians.projection import Z, project, project_back
+from surgisim.gaussians.projection import Z, project, project_back, project_factors
 from surgisim.gaussians.tiles import deal
 from surgisim.problem import Problem
 
@@ -30,23 +30,45 @@ def rasterise(
     return _Rasterise.apply(mean, rotation, scale, opacity, color, probe, camera, background, near)
 
 
+def draw_factors(
+    mean: np.ndarray, factor: np.ndarray, opacity: np.ndarray, color: np.ndarray, camera: Camera, near: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Colour, (H, W, 3), and alpha, (H, W), on black, of Gaussians (G, 3) [m] with covariances M M^T, M being `factor`
+    (G, 3, 3) [m]; all float32."""
+    lens = _lens(camera)
+    ellipse, box = np.zeros((len(mean), 10), np.float32), np.empty((len(mean), 4), np.int32)
+    project_factors(mean, factor, opacity, color, lens, near, ellipse, box)
+    rgb, _, through, *_ = _blended(ellipse, box, np.zeros(3, np.float32), camera)
+    return rgb, 1 - through
+
+
+def _lens(camera: Camera) -> np.ndarray:
+    return np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height], np.float64)
+
+
+def _blended(ellipse: np.ndarray, box: np.ndarray, back: np.ndarray, camera: Camera) -> tuple:
+    """Picture, depth, what shines through, the last entry of each pixel, each entry's weight, and the tiles' lists."""
+    size = (camera.height, camera.width)
+    start, gaussian, number, first = deal(ellipse[:, Z].copy(), box, camera.width, camera.height)
+    rgb, depth = np.empty((*size, 3), np.float32), np.empty(size, np.float32)
+    through, last = np.empty(size, np.float32), np.empty(size, np.int32)
+    weight = np.zeros((len(gaussian), 1), np.float32)
+    blend(ellipse, box, start, gaussian, number, back, rgb, depth, through, last, weight[:, 0])
+    return rgb, depth, through, last, weight, (start, gaussian, number, first)
+
+
 class _Rasterise(torch.autograd.Function):
     @staticmethod
     def forward(ctx, mean, rotation, scale, opacity, color, probe, camera, background, near):
         arrays = [_array(t) for t in (mean, rotation, scale, opacity, color)]
-        g, size = len(mean), (camera.height, camera.width)
-        lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height], np.float64)
+        g, lens, back = len(mean), _lens(camera), np.array(background, np.float32)
         ellipse, box = np.zeros((g, 10), np.float32), np.empty((g, 4), np.int32)
         project(*arrays, lens, near, ellipse, box)
-        start, gaussian, number, first = deal(ellipse[:, Z].copy(), box, camera.width, camera.height)
-        back = np.array(background, np.float32)
-        rgb, depth = np.empty((*size, 3), np.float32), np.empty(size, np.float32)
-        through, last = np.empty(size, np.float32), np.empty(size, np.int32)
-        entry_weight, weight = np.zeros((len(gaussian), 1), np.float32), np.empty((g, 1), np.float32)
-        blend(ellipse, box, start, gaussian, number, back, rgb, depth, through, last, entry_weight[:, 0])
-        gather(first, entry_weight, weight)
+        rgb, depth, through, last, entry_weight, lists = _blended(ellipse, box, back, camera)
+        weight = np.empty((g, 1), np.float32)
+        gather(lists[-1], entry_weight, weight)
         ctx.save_for_backward(mean, rotation, scale)
-        ctx.lists = lens, ellipse, box, start, gaussian, number, first, back, through, last
+        ctx.lists = lens, ellipse, box, *lists, back, through, last
         outputs = rgb, depth, 1 - through, weight[:, 0]
         rgb, depth, alpha, weight = (torch.from_numpy(a) for a in outputs)
         ctx.mark_non_differentiable(weight)

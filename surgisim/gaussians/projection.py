@@ -32,29 +32,47 @@ def project(mean, rotation, scale, opacity, color, lens, near, ellipse, box):
     `lens` is fx, fy, cx, cy, width, height [px]. A Gaussian behind `near` [m], out of view, or thinner than
     ALPHA_MIN everywhere gets an empty box.
     """
-    fx, fy, cx, cy, width, height = lens
     for g in prange(len(mean)):
-        box[g, 0] = box[g, 1] = box[g, 2] = box[g, 3] = 0
-        x, y, z = float(mean[g, 0]), float(mean[g, 1]), float(mean[g, 2])
-        if z < near or opacity[g] < ALPHA_MIN:
-            continue
         R = _matrix(float(rotation[g, 0]), float(rotation[g, 1]), float(rotation[g, 2]), float(rotation[g, 3]))
         S = (float(scale[g, 0]), float(scale[g, 1]), float(scale[g, 2]))
-        a, b, c = _covariance(*_axes(R, S, *_slope(x / z, y / z, fx, fy, cx, cy, width, height), fx / z, fy / z))
-        det = a * c - b * b
-        px, py = fx * x / z + cx, fy * y / z + cy
-        # Where opacity * exp(-sigma) falls to ALPHA_MIN the ellipse ends; the box is exact, not a multiple of sigma.
-        reach = 2.0 * math.log(float(opacity[g]) / ALPHA_MIN)
-        wide, high = math.sqrt(reach * a), math.sqrt(reach * c)
-        x0, x1 = max(0.0, math.ceil(px - wide)), min(width - 1.0, math.floor(px + wide))
-        y0, y1 = max(0.0, math.ceil(py - high)), min(height - 1.0, math.floor(py + high))
-        if x0 > x1 or y0 > y1:
-            continue
-        box[g, 0], box[g, 1], box[g, 2], box[g, 3] = int(x0), int(x1) + 1, int(y0), int(y1) + 1
-        ellipse[g, X], ellipse[g, Y], ellipse[g, Z] = px, py, z
-        ellipse[g, XX], ellipse[g, XY], ellipse[g, YY] = c / det, -b / det, a / det
-        ellipse[g, OPACITY] = opacity[g]
-        ellipse[g, RED], ellipse[g, GREEN], ellipse[g, BLUE] = color[g, 0], color[g, 1], color[g, 2]
+        _write(g, mean, R, S, opacity, color, lens, near, ellipse, box)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def project_factors(mean, factor, opacity, color, lens, near, ellipse, box):
+    """As `project` for Gaussians of covariance M M^T, M being `factor` (G, 3, 3) [m]."""
+    for g in prange(len(mean)):
+        M = (
+            (float(factor[g, 0, 0]), float(factor[g, 0, 1]), float(factor[g, 0, 2])),
+            (float(factor[g, 1, 0]), float(factor[g, 1, 1]), float(factor[g, 1, 2])),
+            (float(factor[g, 2, 0]), float(factor[g, 2, 1]), float(factor[g, 2, 2])),
+        )
+        _write(g, mean, M, (1.0, 1.0, 1.0), opacity, color, lens, near, ellipse, box)
+
+
+@njit(cache=True, error_model="numpy")
+def _write(g, mean, R, S, opacity, color, lens, near, ellipse, box):
+    """One Gaussian's ellipse and box; R S is what its covariance is the square of, R any three rows."""
+    fx, fy, cx, cy, width, height = lens
+    box[g, 0] = box[g, 1] = box[g, 2] = box[g, 3] = 0
+    x, y, z = float(mean[g, 0]), float(mean[g, 1]), float(mean[g, 2])
+    if z < near or opacity[g] < ALPHA_MIN:
+        return
+    a, b, c = _covariance(*_axes(R, S, *_slope(x / z, y / z, fx, fy, cx, cy, width, height), fx / z, fy / z))
+    det = a * c - b * b
+    px, py = fx * x / z + cx, fy * y / z + cy
+    # Where opacity * exp(-sigma) falls to ALPHA_MIN the ellipse ends; the box is exact, not a multiple of sigma.
+    reach = 2.0 * math.log(float(opacity[g]) / ALPHA_MIN)
+    wide, high = math.sqrt(reach * a), math.sqrt(reach * c)
+    x0, x1 = max(0.0, math.ceil(px - wide)), min(width - 1.0, math.floor(px + wide))
+    y0, y1 = max(0.0, math.ceil(py - high)), min(height - 1.0, math.floor(py + high))
+    if x0 > x1 or y0 > y1:
+        return
+    box[g, 0], box[g, 1], box[g, 2], box[g, 3] = int(x0), int(x1) + 1, int(y0), int(y1) + 1
+    ellipse[g, X], ellipse[g, Y], ellipse[g, Z] = px, py, z
+    ellipse[g, XX], ellipse[g, XY], ellipse[g, YY] = c / det, -b / det, a / det
+    ellipse[g, OPACITY] = opacity[g]
+    ellipse[g, RED], ellipse[g, GREEN], ellipse[g, BLUE] = color[g, 0], color[g, 1], color[g, 2]
 
 
 @njit(cache=True, parallel=True, error_model="numpy")

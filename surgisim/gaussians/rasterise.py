@@ -17,6 +17,8 @@ from surgisim.artifacts.camera import Camera
 from surgisim.problem import Problem
 
 Engine = Literal["numba", "gsplat", "twin"]
+NEAR = 1e-3
+"""What is closer along z is not drawn [m]."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ def rasterise(
     background: tuple[float, float, float] | None = None,
     engine: Engine = "numba",
     probe: torch.Tensor | None = None,
-    near: float = 1e-3,
+    near: float = NEAR,
     weigh: bool = True,
 ) -> Image:
     """The image of the Gaussians, with gradients for their five attributes from rgb, depth and alpha.
@@ -94,7 +96,7 @@ def render(
     camera: Camera,
     *,
     background: tuple[float, float, float] | None = None,
-    near: float = 1e-3,
+    near: float = NEAR,
     device: str = "cpu",
 ) -> Image:
     """`rasterise` for numpy arrays, without gradients."""
@@ -104,6 +106,25 @@ def render(
         tensors = (torch.from_numpy(a).to(there) for a in arrays)
         seen = rasterise(*tensors, camera, background=background, near=near, engine=engine_on(there))
     return Image(*(a.cpu().numpy() for a in (seen.rgb, seen.depth, seen.alpha, seen.weight)))
+
+
+def render_factors(
+    mean: np.ndarray, factor: np.ndarray, opacity: np.ndarray, color: np.ndarray, camera: Camera, *, device: str = "cpu"
+) -> tuple[np.ndarray, np.ndarray]:
+    """Colour, sRGB 0-1 on black, (H, W, 3), and alpha, (H, W), of Gaussians with covariances M M^T.
+
+    M is `factor` (G, 3, 3) [m]; the rest as in `rasterise`. Raises Problem for values that are not finite.
+    """
+    arrays = {"mean": mean, "factor": factor, "opacity": opacity, "color": color}
+    for name, array in arrays.items():
+        if not np.isfinite(array).all():
+            raise Problem(f"rasterise: {name} is not finite for some of {len(mean)} Gaussians.")
+    ready = [np.ascontiguousarray(a, np.float32) for a in arrays.values()]
+    if device == "cuda":
+        from surgisim.gaussians.engine_gsplat import draw_factors
+    else:
+        from surgisim.gaussians.engine_numba import draw_factors
+    return draw_factors(*ready, camera, NEAR)
 
 
 def to_bytes(rgb: np.ndarray) -> np.ndarray:

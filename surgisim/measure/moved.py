@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.replay import Replay
+from surgisim.side_by_side import in_order
 
 MOVED = 0.25
 """Share of the frame's largest displacement from which the visible surface counts as moved."""
@@ -20,14 +21,14 @@ def moved_region(replay: Replay, body: Body, camera: Camera) -> np.ndarray:
     at least `MOVED` of the frame's largest displacement of the surface."""
     y, x = np.mgrid[: camera.height, : camera.width]
     pixels = np.stack([x.ravel(), y.ravel()], 1)
-    region = np.zeros((len(replay.time), camera.height, camera.width), bool)
     rest = body.rest[body.surface].astype(float)
-    for t, position in enumerate(replay.position[:, body.surface]):
+
+    def region(position: np.ndarray) -> np.ndarray:
         moved = np.linalg.norm(position - rest, axis=1)
         pixel = camera.fx / position[:, 2]
         if len(moved) == 0 or (moved * pixel).max() < LEAST:
-            continue
+            return np.zeros(x.shape, bool)
         away, near = cKDTree(camera.project(position)).query(pixels)
-        shown = (moved[near] >= MOVED * moved.max()) & (away <= REACH * body.spacing * pixel[near])
-        region[t] = shown.reshape(region.shape[1:])
-    return region
+        return ((moved[near] >= MOVED * moved.max()) & (away <= REACH * body.spacing * pixel[near])).reshape(x.shape)
+
+    return np.stack(list(in_order(region, zip(replay.position[:, body.surface]))))

@@ -58,14 +58,8 @@ def contact(story: Story) -> list[Row]:
     return rows
 
 
-def depth_range(story: Story) -> tuple[float, float]:
-    """What the depth colours span [m]."""
-    low, high = np.percentile(story.run.depth.z, [1, 99])
-    return float(low), float(max(high, low + 1e-6))
-
-
 def depth_picture(story: Story, t: int, width: int) -> np.ndarray:
-    return overlay.enlarged(mapped(story.run.depth.z[t], *depth_range(story), DEPTH), width)
+    return overlay.enlarged(mapped(story.run.depth.z[t], *story.depth_range, DEPTH), width)
 
 
 def tracked_picture(story: Story, t: int, width: int) -> np.ndarray:
@@ -85,7 +79,7 @@ def _tracked(story: Story, t: int) -> str:
 
 
 def _depth(story: Story) -> Row:
-    low, high = depth_range(story)
+    low, high = story.depth_range
     unit = "mm" if story.run.camera.scale == "known" else "mm, arbitrary scale"
     bar = (gradient(DEPTH), f"{1e3 * low:.0f}", f"{1e3 * high:.0f}", f"depth along the view [{unit}]")
     pictures = [jpeg(depth_picture(story, t, story.settings.cell)) for t in story.moments]

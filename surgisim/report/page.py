@@ -1,11 +1,13 @@
 """One run as one HTML file."""
 
+from collections.abc import Sequence
 from importlib.resources import files
 
 import jinja2
+import numpy as np
 
 from surgisim.report import overlay
-from surgisim.report.contact import contact, depth_picture, depth_range, tracked_picture
+from surgisim.report.contact import contact, depth_picture, tracked_picture
 from surgisim.report.distrust import distrust
 from surgisim.report.films import Film, strip
 from surgisim.report.headline import headline
@@ -15,6 +17,7 @@ from surgisim.report.plots import plots
 from surgisim.report.scenery import body_views, material_views, scene_views, side_film
 from surgisim.report.story import Story
 from surgisim.report.tables import grids, lists
+from surgisim.side_by_side import in_order
 
 
 def page(story: Story, *, progress=lambda *_: None) -> bytes:
@@ -55,22 +58,26 @@ def films(story: Story) -> list[tuple[str, Film]]:
     if story.replayed:
         beside["replay of the fitted body"] = run.replay.rgb
     zoom = round(0.75 * settings.panel)
-    low, high = depth_range(story)
+    low, high = story.depth_range
     unit = "mm" if run.camera.scale == "known" else "mm*"
-    seen = {
-        "masks: instrument green, highlights orange": [
-            overlay.masks(run.frames.rgb[t], run.masks.tool[t], run.masks.specular[t], run.masks.tissue[t])
-            for t in whole
-        ],
-        "instrument taken out": run.inpainted.rgb,
-        "depth": [depth_picture(story, t, zoom) for t in whole],
-        "tracks and grasp": [tracked_picture(story, t, zoom) for t in whole],
-    }
+
+    def seen() -> dict[str, Sequence[np.ndarray]]:
+        return {
+            "masks: instrument green, highlights orange": [
+                overlay.masks(run.frames.rgb[t], run.masks.tool[t], run.masks.specular[t], run.masks.tissue[t])
+                for t in whole
+            ],
+            "instrument taken out": run.inpainted.rgb,
+            "depth": [depth_picture(story, t, zoom) for t in whole],
+            "tracks and grasp": [tracked_picture(story, t, zoom) for t in whole],
+        }
+
     box = (round(1.4 * settings.panel), settings.panel)
     bar = (gradient(DEPTH), f"{1e3 * low:.0f}", f"{1e3 * high:.0f}", f"depth along the view [{unit}]")
     how = {"fps": run.camera.fps, "quality": settings.quality, "paper": story.moments[len(story.moments) // 2]}
-    return [
-        ("Recorded, reconstructed, replayed", strip(beside, settings.panel, **how)),
-        ("The replay from where no camera was", side_film(story, box, **how)),
-        ("What the stages saw", strip(seen, zoom, bar=bar, **how)),
-    ]
+    made = {
+        "Recorded, reconstructed, replayed": lambda: strip(beside, settings.panel, **how),
+        "The replay from where no camera was": lambda: side_film(story, box, **how),
+        "What the stages saw": lambda: strip(seen(), zoom, bar=bar, **how),
+    }
+    return list(zip(made, in_order(lambda film: film(), zip(made.values())), strict=True))

@@ -29,6 +29,12 @@ class Story:
         return np.arange(self.run.camera.frames) / self.run.camera.fps
 
     @cached_property
+    def depth_range(self) -> tuple[float, float]:
+        """What the depth colours span [m]."""
+        low, high = np.percentile(self.run.depth.z, [1, 99])
+        return float(low), float(max(high, low + 1e-6))
+
+    @cached_property
     def phase(self) -> np.ndarray:
         return phases(self.run.motion)
 

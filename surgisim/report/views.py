@@ -59,7 +59,7 @@ def balls(points: np.ndarray, color: np.ndarray, radius: float, view: View) -> n
     return picture
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _paint(picture, nearest, pixels, far, color, radius, size):
     """Every pixel keeps the ball whose skin is nearest; a ball is darker towards its rim."""
     height, width = nearest.shape

@@ -10,8 +10,8 @@ from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.scene import Scene
 from surgisim.gaussians.attributes import drawn
-from surgisim.gaussians.engine_gsplat import lacking, render_covariances
-from surgisim.gaussians.rasterise import Image, render, to_bytes
+from surgisim.gaussians.engine_gsplat import lacking
+from surgisim.gaussians.rasterise import render_factors, to_bytes
 from surgisim.mpm.carried import Carried
 from surgisim.mpm.nodes import Nodes
 
@@ -31,51 +31,48 @@ class Light(Protocol):
 class Splats:
     """Gaussians bound to a body."""
 
-    def __init__(
-        self, mean, rotation, scale, opacity, color, simulator: Nodes, shade: Shade | None = None, device: str = "cpu"
-    ) -> None:
+    def __init__(self, mean, rotation, scale, opacity, color, simulator: Nodes, device: str = "cpu") -> None:
         """device: where they are drawn; on 'cuda' only where gsplat is there."""
-        self.carried, self.opacity, self.color, self.shade = Carried(mean, simulator), opacity, color, shade
-        self.on_gpu = device == "cuda" and not lacking()
+        self.carried, self.opacity, self.color = Carried(mean, simulator), opacity, color
+        self.device = "cuda" if device == "cuda" and not lacking() else "cpu"
         turn = Rotation.from_quat(np.asarray(rotation, float), scalar_first=True).as_matrix()
         self.factor = turn * np.asarray(scale, float)[:, None, :]
 
-    def seen(self, u: np.ndarray, camera: Camera) -> Image:
-        """The image at displacements of the solid nodes [m], (A, 3)."""
+    def seen(self, u: np.ndarray, camera: Camera, shade: Shade | None) -> tuple[np.ndarray, np.ndarray]:
+        """Colour (H, W, 3) and alpha (H, W) at displacements of the solid nodes [m], (A, 3)."""
         mean, F = self.carried.at(u)
-        color = self.color if self.shade is None else self.shade(mean, F)
+        color = self.color if shade is None else shade(mean, F)
         # A splat's covariance M M^T becomes (F M)(F M)^T.
-        factor = F @ self.factor
-        if self.on_gpu:
-            return render_covariances(mean, factor @ factor.transpose(0, 2, 1), self.opacity, color, camera)
-        # Its axes are the left singular vectors.
-        axes, radii, _ = np.linalg.svd(factor)
-        axes = axes * np.sign(np.linalg.det(axes))[:, None, None]
-        rotation = Rotation.from_matrix(axes).as_quat(scalar_first=True)
-        return render(mean, rotation, np.maximum(radii, 1e-7), self.opacity, color, camera)
+        return render_factors(mean, F @ self.factor, self.opacity, color, camera, device=self.device)
 
 
 class Drawn:
     """The scene, and behind it, where it opens, the body's interior and what lies beyond the picture's edge."""
 
     def __init__(
-        self, scene: Scene, rim: Scene, body: Body, simulator: Nodes, interior: bool, light: Light | None = None,
-        device: str = "cpu",
-    ) -> None:  # fmt: skip
-        """rim: see `gaussians.rim`; light: None leaves every colour as the rest frame has it."""
-        shade = (lambda mean, color: None) if light is None else light.shade
+        self, scene: Scene, rim: Scene, body: Body, simulator: Nodes, interior: bool, device: str = "cpu"
+    ) -> None:
+        """rim: see `gaussians.rim`."""
         front, behind = drawn(scene), drawn(rim)
         if interior:
             behind = [np.concatenate(pair) for pair in zip(behind, _inside(body), strict=True)]
-        self.front, self.behind = (Splats(*s, simulator, shade(s[0], s[-1]), device) for s in (front, behind))
+        self.front, self.behind = (Splats(*s, simulator, device) for s in (front, behind))
 
-    def picture(self, u: np.ndarray, camera: Camera) -> np.ndarray:
-        """The frame at displacements of the solid nodes [m], (A, 3), as (H, W, 3) uint8."""
-        front = self.front.seen(u, camera)
-        if front.alpha.min() >= COVERED:
-            return to_bytes(front.rgb)
-        gap = np.maximum(0.0, 1 - front.alpha / COVERED)[..., None]
-        return to_bytes(front.rgb + gap * self.behind.seen(u, camera).rgb)
+    def under(self, light: Light | None) -> Callable[[np.ndarray, Camera], np.ndarray]:
+        """What a camera sees at displacements of the solid nodes [m], (A, 3), as (H, W, 3) uint8.
+
+        light: None leaves every colour as the rest frame has it.
+        """
+        shades = [light and light.shade(s.carried.rest, s.color) for s in (self.front, self.behind)]
+
+        def picture(u: np.ndarray, camera: Camera) -> np.ndarray:
+            rgb, alpha = self.front.seen(u, camera, shades[0])
+            if alpha.min() >= COVERED:
+                return to_bytes(rgb)
+            gap = np.maximum(0.0, 1 - alpha / COVERED)[..., None]
+            return to_bytes(rgb + gap * self.behind.seen(u, camera, shades[1])[0])
+
+        return picture
 
 
 def _inside(body: Body) -> tuple[np.ndarray, ...]:

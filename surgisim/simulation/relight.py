@@ -98,14 +98,14 @@ def find_light(
     states: Sequence[np.ndarray],
     frames: Frames,
     masks: Masks,
-    picture: Callable[["Light", np.ndarray], np.ndarray],
+    under: Callable[["Light"], Callable[[np.ndarray], np.ndarray]],
 ) -> Light:
     """Learn the lamp from how the recorded brightness of carried tissue changes; frames held out are not looked at.
 
-    states: displacement of the solid nodes [m] at every frame of the recorded manipulation, (A, 3) each. picture: what
-    a light makes of the scene at such a state, (H, W, 3) uint8: where tissue is not where it was, brightness along its
-    way is another's, so of a light with and without each of its parts the one whose pictures are nearest is taken, and
-    the plainest of those that are about as near.
+    states: displacement of the solid nodes [m] at every frame of the recorded manipulation, (A, 3) each. under: what
+    a light makes of the scene, from such a state to (H, W, 3) uint8: where tissue is not where it was, brightness along
+    its way is another's, so of a light with and without each of its parts the one whose pictures are nearest is taken,
+    and the plainest of those that are about as near.
     """
     surface = surface_of(scene, camera)
     normals = rest_normals(surface.z, camera, spacing)
@@ -130,7 +130,7 @@ def find_light(
         lamp = replace(strength, value=value)
         plain = Light(camera, normals, without(rest, glint), glint, lamp, ambient, 0.0)
         lights += [plain, replace(plain, response=response)][: 1 if response.choice is None else 2]
-    best = _nearest(lights, picture, way, used, frames, masks, cell)
+    best = _nearest(lights, under, way, used, frames, masks, cell)
     return _with_highlights(best, rest, surface.z, simulator, used, frames, masks)
 
 
@@ -183,16 +183,16 @@ def _recorded(way: _Way, used, frames, masks, blur: float) -> tuple[np.ndarray, 
     return level - level[:, :1], known & known[:, :1]
 
 
-def _nearest(lights: list[Light], picture, way: _Way, used, frames, masks, cell: float) -> Light:
+def _nearest(lights: list[Light], under, way: _Way, used, frames, masks, cell: float) -> Light:
     """The light whose pictures are nearest to frames in which tissue has gone far; of about as near ones the first."""
-    judged = way.farthest(JUDGED)
+    judged, pictures = way.farthest(JUDGED), [under(light) for light in lights]
     error = np.zeros((len(lights), len(judged)))
     for k, j in enumerate(judged):
         t, u = used[j]
         # Where nothing moves all of them draw the same.
         here = masks.tissue[t] & ~beside(masks.specular[t]) & way.moving(j, masks.tissue.shape[1:], cell)
-        for n, light in enumerate(lights):
-            error[n, k] = (((picture(light, u) - frames.rgb[t].astype(float))[here] / 255) ** 2).sum()
+        for n, picture in enumerate(pictures):
+            error[n, k] = (((picture(u) - frames.rgb[t].astype(float))[here] / 255) ** 2).sum()
     return lights[mildest(tuple(range(len(lights))), error)]
 
 

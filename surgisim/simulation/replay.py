@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from surgisim.mpm.setup import SKIN, Prepared, checked_per_frame, prepare, theta
 from surgisim.mpm.simulator import Run, Simulator
 from surgisim.physics.catalogue import choose, defaults
 from surgisim.problem import Problem
+from surgisim.side_by_side import in_order
 from surgisim.simulation.draw import Drawn
 from surgisim.simulation.operation import Plan, plan
 from surgisim.simulation.relight import Light, find_light
@@ -73,25 +75,32 @@ def replay(
             path = _path(parts[0], again, physics, material, camera, per_frame)
             recorded = whole.run(theta, path).u
 
-        def picture(light: Light, u: np.ndarray) -> np.ndarray:
-            return Drawn(scene, rim, body, whole, settings.interior, light, settings.device).picture(u, camera)
+        splats = Drawn(scene, rim, body, whole, settings.interior, settings.device)
 
-        light = find_light(scene, camera, body.spacing, whole, recorded, *recording, picture)
+        def under(light: Light) -> Callable[[np.ndarray], np.ndarray]:
+            return partial(splats.under(light), camera=camera)
+
+        light = find_light(scene, camera, body.spacing, whole, recorded, *recording, under)
         progress(0.5, 1.0, f"lamp: {light.words}")
-    position, nodes, smallest, energy, rgb = [], [], [], [], []
-    looks = {}
-    for t in range(frames):
+    looks = {
+        id(s): _Look(s, body, (scene, rim), settings, physics, theta, light)
+        for s in dict.fromkeys(simulator for simulator, _, _ in states.values())
+    }
+
+    def seen(t: int) -> tuple:
         simulator, run, k = states[t]
-        key = id(simulator)
-        if key not in looks:
-            looks[key] = _Look(simulator, body, (scene, rim), settings, physics, theta, light)
-        moved, least, joules = looks[key].measure(run.u[k], run.v[k])
+        look, u = looks[id(simulator)], run.u[k]
+        nodes = simulator.displaced(u)[: simulator.grid.count].astype(np.float32)
+        return *look.measure(u, run.v[k]), nodes, look.picture(u, camera) if settings.render else None
+
+    position, nodes, smallest, energy, rgb = [], [], [], [], []
+    for t, (moved, least, joules, displaced, picture) in enumerate(in_order(seen, zip(range(frames)))):
         position.append(moved.astype(np.float32))
-        nodes.append(simulator.displaced(run.u[k])[: simulator.grid.count].astype(np.float32))
+        nodes.append(displaced)
         smallest.append(least)
         energy.append(joules)
         if settings.render:
-            rgb.append(looks[key].drawn.picture(run.u[k], camera))
+            rgb.append(picture)
         progress(0.5 + 0.5 * (t + 1) / frames, 1.0, f"drawing frame {t + 1}/{frames}")
     grid = whole.grid
     picture = np.stack(rgb) if rgb else np.zeros((0, camera.height, camera.width, 3), np.uint8)
@@ -189,7 +198,7 @@ class _Look:
             if term.energy:
                 self.laws.append((term.energy, values))
         if settings.render:
-            self.drawn = Drawn(*scenes, body, simulator, settings.interior, light, settings.device)
+            self.picture = Drawn(*scenes, body, simulator, settings.interior, settings.device).under(light)
 
     def measure(self, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, float, tuple[float, float]]:
         """Particle positions [m], (P, 3); smallest det F; kinetic and elastic energy [J]."""

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from surgisim.estimation import refine as room
 from surgisim.estimation.refine import refine
 from surgisim.mpm.simulator import Breakdown
 
@@ -13,7 +14,9 @@ SOFT = -1.0
 
 
 class Body:
-    """Particles whose displacement is the logarithm of their parameter; the first breaks when it softens."""
+    """Particles whose displacement is the logarithm of their parameter; the first breaks at `breaks`."""
+
+    breaks = 0.95
 
     rest = np.stack(np.meshgrid(*[np.linspace(0, 1, 6)] * 3), -1).reshape(-1, 3)
     grid = SimpleNamespace(spacing=0.2)
@@ -22,7 +25,7 @@ class Body:
         self.named = named
 
     def run(self, theta, drive):
-        if theta[0, 0] < 0.95:
+        if theta[0, 0] < self.breaks:
             raise Breakdown("turned inside out", 0 if self.named else None)
         return SimpleNamespace(u=np.repeat(np.log(theta)[None], 2, 0))
 
@@ -68,3 +71,16 @@ def test_a_break_in_no_known_place_shortens_the_step():
 def test_every_step_that_is_kept_fits_better():
     track = [row["track"] for row in refined(named=True).history]
     assert (np.diff(track) < 0).all()
+
+
+def test_where_the_last_steps_mislead_it_goes_straight_down_again(monkeypatch):
+    def nearly_level(past, slope):
+        level = np.random.default_rng(0).normal(size=slope.shape)
+        level -= (level * slope).sum() / (slope * slope).sum() * slope
+        return 0.1 * level - 1e-12 * slope
+
+    monkeypatch.setattr(Body, "breaks", 0.0)
+    monkeypatch.setattr(room._Past, "_toward_bottom", nearly_level)
+    history = refined(named=True).history
+    assert len(history) > 8
+    assert history[-1]["judged"] < 0.5 * history[0]["judged"]

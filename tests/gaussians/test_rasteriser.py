@@ -10,11 +10,12 @@ import pytest
 import torch
 from clouds import NAMES, TOLERANCE, camera, cloud, distance, one, together
 from numba import njit
+from scipy.spatial.transform import Rotation
 
 from surgisim.gaussians import tiles
 from surgisim.gaussians.blending import exp_negative
 from surgisim.gaussians.engine_gsplat import lacking
-from surgisim.gaussians.rasterise import rasterise, render, to_bytes
+from surgisim.gaussians.rasterise import rasterise, render, render_factors, to_bytes
 from surgisim.problem import Problem
 
 VIEW = camera(48, 40)
@@ -193,3 +194,24 @@ def test_gaussians_too_large_for_the_memory_are_refused(monkeypatch):
 def test_without_cuda_the_other_engine_is_named():
     with pytest.raises(Problem, match=r"engine gsplat needs .* Use engine numba"):
         rasterise(*cloud(9, VIEW), VIEW, engine="gsplat")
+
+
+GPU = pytest.mark.skipif(bool(lacking()), reason=f"gsplat needs {lacking()}")
+
+
+@pytest.mark.parametrize("device", ["cpu", pytest.param("cuda", marks=GPU)])
+def test_a_covariances_factor_may_be_turned_as_one_likes(device):
+    mean, rotation, scale, opacity, color = (t.numpy() for t in cloud(200, VIEW, seed=4))
+    factor = Rotation.from_quat(rotation, scalar_first=True).as_matrix() * scale[:, None, :]
+    factor = factor @ Rotation.random(len(mean), random_state=0).as_matrix()
+    wanted = render(mean, rotation, scale, opacity, color, VIEW)
+    rgb, alpha = render_factors(mean, factor, opacity, color, VIEW, device=device)
+    allowed = TOLERANCE["forward"] if device == "cpu" else TOLERANCE["cuda"]
+    assert distance(torch.from_numpy(rgb), torch.from_numpy(wanted.rgb)) < allowed
+    assert distance(torch.from_numpy(alpha), torch.from_numpy(wanted.alpha)) < allowed
+
+
+def test_a_factor_that_is_no_number_is_named():
+    mean, _, _, opacity, color = (t.numpy() for t in cloud(5, VIEW))
+    with pytest.raises(Problem, match="factor is not finite"):
+        render_factors(mean, np.full((5, 3, 3), np.nan), opacity, color, VIEW)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from surgisim.perception.flow import dense_flow
-from surgisim.perception.side_by_side import in_order
+from surgisim.side_by_side import in_order
 
 
 @pytest.mark.parametrize("count", ["1", "3,2"])

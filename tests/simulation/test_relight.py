@@ -58,7 +58,7 @@ def picture(played, lamp, u, device="cpu"):
     """What the pulled slab by itself looks like under a lamp or under none."""
     simulator, _, scene = played
     nothing = replace(scene, **{name: value[:0] for name, value in vars(scene).items()})
-    return Drawn(scene, nothing, BODY, simulator, False, lamp, device).picture(u, CAMERA)
+    return Drawn(scene, nothing, BODY, simulator, False, device).under(lamp)(u, CAMERA)
 
 
 def recorded(played, lamp):
@@ -75,7 +75,8 @@ def recorded(played, lamp):
 def found(played, lamp, draw=None):
     simulator, states, scene = played
     draw = draw or (lambda lamp, u: picture(played, lamp, u))
-    return find_light(scene, CAMERA, BODY.spacing, simulator, states, *recorded(played, lamp), draw)
+    under = lambda lamp: lambda u: draw(lamp, u)  # noqa: E731
+    return find_light(scene, CAMERA, BODY.spacing, simulator, states, *recorded(played, lamp), under)
 
 
 @pytest.mark.skipif(bool(lacking()), reason=f"gsplat needs {lacking()}")

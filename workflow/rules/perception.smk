@@ -63,6 +63,7 @@ rule inpainting:
         "benchmarks/{clip}/{variant}/inpainting.tsv"
     conda:
         "../../envs/perception.yaml"
+    threads: 4
     resources:
         mem_mb=3000,
         gpu=0,
@@ -90,6 +91,7 @@ rule depth:
         "benchmarks/{clip}/{variant}/depth.tsv"
     conda:
         "../../envs/perception.yaml"
+    threads: 4
     resources:
         mem_mb=3000,
         gpu=0,

@@ -32,6 +32,7 @@ rule evaluation:
         "benchmarks/{clip}/{variant}/evaluation.tsv"
     conda:
         "../../envs/report.yaml"
+    threads: 4
     resources:
         mem_mb=3000,
     params:
@@ -83,6 +84,7 @@ rule report:
         "benchmarks/{clip}/{variant}/report.tsv"
     conda:
         "../../envs/report.yaml"
+    threads: 4
     resources:
         mem_mb=3000,
     params:

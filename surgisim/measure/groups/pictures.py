@@ -10,6 +10,7 @@ from surgisim.measure.lpips import SMALLEST, Lpips
 from surgisim.measure.psnr import psnr
 from surgisim.measure.run import Run
 from surgisim.measure.ssim import ssim
+from surgisim.side_by_side import in_order
 
 WHEN = {
     "used": (USED, "used frames"),
@@ -50,8 +51,8 @@ def pictures(drawn: np.ndarray, run: Run, lpips: Lpips | None) -> Pictures:
     elif min(drawn.shape[1:3]) < SMALLEST:
         why_not, lpips = f"frames under {SMALLEST} px are too small for AlexNet", None
     return Pictures(
-        np.array([psnr(*t) for t in triples]),
-        np.array([ssim(*t) for t in triples]),
+        np.array(list(in_order(psnr, triples))),
+        np.array(list(in_order(ssim, triples))),
         np.array([lpips(*t) for t in triples]) if lpips else None,
         why_not,
     )

@@ -12,7 +12,7 @@ and with the motion seen across the view, the instrument's too, it tells how far
 The absolute size is not known: the median depth of frame 0 is set to a nominal one.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -26,6 +26,7 @@ from surgisim.perception.depth.shading import Lattice, explain, shading
 from surgisim.perception.grasp.outline import Outline
 from surgisim.perception.tracking.spread import spread
 from surgisim.perception.tracking.warp import Warp, follow_surface
+from surgisim.side_by_side import ahead, in_order
 
 TRUST = 0.5
 """Confidence of a well explained pixel: brightness tells changes well and shapes only roughly."""
@@ -76,10 +77,10 @@ def estimate(
     rest = _first(lattice, light, hue, known, relief)
     rest += np.log(distance) - np.median(rest[known > 0.5] if (known > 0.5).any() else rest)
     albedo = light + shading(lattice, rest)
-    frames, watched, alone = [], [], rest - np.median(rest)
-    for t, warp in enumerate(follow_surface(rgb, hidden)):
-        now = _read(rgb[t], hidden[t] | specular[t], lattice.shape, grey)
-        alone = _first(lattice, *now, relief, begin=alone, turns=1) if t else alone
+    frames, watched = [], []
+    looks = in_order(_read, ((f, h | s, lattice.shape, grey) for f, h, s in zip(rgb, hidden, specular, strict=True)))
+    by_itself = ahead(_by_themselves(lattice, looks, rest - np.median(rest), relief))
+    for t, (warp, (now, alone)) in enumerate(zip(ahead(follow_surface(rgb, hidden)), by_itself, strict=True)):
         position, sure = _placed(warp, lattice)
         frames.append((sure, now, alone))
         watched.append(_watch(lattice, position, sure, now))
@@ -99,6 +100,13 @@ def estimate(
         if progress:
             progress(len(rgb) + t + 1, 2 * len(rgb), "depth from light")
     return np.stack(z).astype(np.float32), np.stack(confidence).astype(np.float32)
+
+
+def _by_themselves(lattice: Lattice, looks, alone: np.ndarray, relief: float) -> Iterator[tuple]:
+    """What `_read` has of each frame, and the log depth that it suggests by itself, begun from that of the last."""
+    for t, now in enumerate(looks):
+        alone = _first(lattice, *now, relief, begin=alone, turns=1) if t else alone
+        yield now, alone
 
 
 def _placed(warp: Warp, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from surgisim.perception.flow import dense_flow
-from surgisim.perception.side_by_side import in_order
+from surgisim.side_by_side import in_order
 
 
 def frame_flow(rgb: np.ndarray) -> np.ndarray:

@@ -66,8 +66,8 @@ def _followed(tool: np.ndarray, edge: np.ndarray) -> np.ndarray:
     for t, mask in enumerate(tool):
         now, count = _next(mask, last, edge, count)
         number, pieces = cv2.connectedComponents((now > 0).astype(np.uint8))
-        owners = [set(np.unique(now[pieces == p])) for p in range(1, number)]
-        present = sorted(set(np.unique(now)) - {0})
+        owners = [set(_values(now[pieces == p])) for p in range(1, number)]
+        present = sorted(set(_values(now)) - {0})
         for i, a in enumerate(present):
             for b in present[i + 1 :]:
                 both[a, b] = both.get((a, b), 0) + 1
@@ -78,8 +78,15 @@ def _followed(tool: np.ndarray, edge: np.ndarray) -> np.ndarray:
     for (a, b), times in joined.items():
         if times > TOGETHER * both[a, b]:
             out[out == b] = a
-    _, packed = np.unique(out, return_inverse=True)
-    return (packed.reshape(out.shape) + (0 if (out == 0).any() else 1)).astype(np.int32)
+    left = [i for i in _values(out) if i]
+    packed = np.zeros(out.max() + 1, np.int32)
+    packed[left] = np.arange(1, len(left) + 1)
+    return packed[out]
+
+
+def _values(label: np.ndarray) -> np.ndarray:
+    """The different ones, in order; many times faster than sorting all."""
+    return np.flatnonzero(np.bincount(label.ravel()))
 
 
 def _enters(mask: np.ndarray, edge: np.ndarray) -> bool:

@@ -7,6 +7,7 @@ does not flicker.
 """
 
 from collections.abc import Callable
+from itertools import count, pairwise
 
 import cv2
 import numpy as np
@@ -16,6 +17,7 @@ from surgisim.config.inpainting import Inpainting
 from surgisim.perception.flow import dense_flow
 from surgisim.perception.inpainting.smooth import continued
 from surgisim.perception.inpainting.source import Source, behind, followed, seen
+from surgisim.side_by_side import in_order
 
 Invent = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -29,14 +31,17 @@ def fill_with(rgb, hole, settings: Inpainting, progress, *, invent: Invent) -> t
     """As `fill`, with `invent(frame, hole) -> frame` for what no frame saw."""
     total = len(rgb)
     to_next, to_last = _tissue_motion(rgb, hole, progress)
-    earlier = _swept(range(total), to_last, hole)
-    later = _swept(range(total - 1, -1, -1), to_next, hole)
+    earlier, later = in_order(_swept, ((range(total), to_last, hole), (range(total - 1, -1, -1), to_next, hole)))
     filled, known = rgb.copy(), ~hole
-    for t in range(total):
-        progress(total * (0.5 + 0.3 * t / total), total, "copying what other frames saw")
+
+    def copies(t: int) -> tuple[np.ndarray, np.ndarray]:
         source = _nearer(earlier[t], later[t], t, settings.reach)
         copied = hole[t] & source.found
-        filled[t][copied] = _lit_alike(rgb, hole, source, t, copied)
+        return copied, _lit_alike(rgb, hole, source, t, copied)
+
+    for t, (copied, colors) in enumerate(in_order(copies, zip(range(total)))):
+        progress(total * (0.5 + 0.3 * t / total), total, "copying what other frames saw")
+        filled[t][copied] = colors
         known[t] |= copied
     origin = np.where(hole, np.where(known, COPIED, INVENTED), SEEN).astype(np.uint8)
     _invent_into(filled, known, to_next, to_last, invent, progress)
@@ -64,17 +69,24 @@ def _tissue_motion(rgb, hole, progress) -> tuple[list[np.ndarray], list[np.ndarr
     """Flow of the tissue t -> t + 1 (last entry unused) and t -> t - 1 (first unused)."""
     still = np.zeros((*rgb.shape[1:3], 2), np.float32)
     # The instrument is smoothed away first: its edges would drag the flow of the tissue beside it along.
-    veiled = [
-        np.rint(continued(f.astype(np.float32), ~h)).clip(0, 255).astype(np.uint8)
-        for f, h in zip(rgb, hole, strict=True)
-    ]
+    veiled = in_order(_veiled, zip(rgb, hole, strict=True))
     to_next, to_last = [], [still]
-    for t in range(len(rgb) - 1):
+    pairs = ((*frames, *holes) for frames, holes in zip(pairwise(veiled), pairwise(hole), strict=True))
+    for t, (on, back) in enumerate(in_order(_between, pairs)):
         progress(len(rgb) * 0.5 * t / len(rgb), len(rgb), "following the tissue")
-        there, back = dense_flow(veiled[t], veiled[t + 1]), dense_flow(veiled[t + 1], veiled[t])
-        to_next.append(behind(there, back, hole[t], hole[t + 1]))
-        to_last.append(behind(back, there, hole[t + 1], hole[t]))
+        to_next.append(on)
+        to_last.append(back)
     return [*to_next, still], to_last
+
+
+def _veiled(frame: np.ndarray, hole: np.ndarray) -> np.ndarray:
+    return np.rint(continued(frame.astype(np.float32), ~hole)).clip(0, 255).astype(np.uint8)
+
+
+def _between(one, other, hole_one, hole_other) -> tuple[np.ndarray, np.ndarray]:
+    """Flow of the tissue from one frame to another, and back."""
+    there, back = dense_flow(one, other), dense_flow(other, one)
+    return behind(there, back, hole_one, hole_other), behind(back, there, hole_other, hole_one)
 
 
 def _swept(order, flow: list[np.ndarray], hole: np.ndarray) -> dict[int, Source]:
@@ -147,17 +159,21 @@ def _invent_into(filled, known, to_next, to_last, invent: Invent, progress) -> N
     lacking = (~known).sum((1, 2))
     if not lacking.any():
         return
-    first, done = int(np.argmax(lacking)), 0
-    for order, flow in ((range(first, total), to_last), (range(first, -1, -1), to_next)):
-        before: Source | None = None
+    first, done = int(np.argmax(lacking)), count(1)
+    filled[first] = np.where(known[first][..., None], filled[first], invent(filled[first], ~known[first]))
+
+    def onward(order: range, flow: list[np.ndarray]) -> None:
+        before = seen(first, np.zeros_like(known[first]))
         for t in order:
-            done += 1
-            progress(total * (0.8 + 0.2 * done / (total + 1)), total, "inventing what no frame saw")
+            progress(total * (0.8 + 0.2 * next(done) / (total + 1)), total, "inventing what no frame saw")
             gap = ~known[t]
-            here = seen(t, gap) if before is None else followed(before, flow[t], t, gap)
+            here = followed(before, flow[t], t, gap)
             taken = gap & here.found
             filled[t][taken] = np.rint(_looked_up(filled, here, taken)).astype(np.uint8)
             left = gap & ~here.found
-            if left.any() and not (t == first and flow is to_next):
+            if left.any():
                 filled[t] = np.where(left[..., None], invent(filled[t], left), filled[t])
             before = Source(np.where(left, t, here.frame), here.xy)
+
+    for _ in in_order(onward, ((range(first + 1, total), to_last), (range(first - 1, -1, -1), to_next))):
+        pass

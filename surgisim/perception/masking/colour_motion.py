@@ -19,7 +19,7 @@ from surgisim.perception.flow import agrees, carry, dense_flow
 from surgisim.perception.masking.appearance import OFFSET, features, highlights, lit
 from surgisim.perception.masking.settling import settled
 from surgisim.perception.masking.shape import bridged, entering, snapped, solid
-from surgisim.perception.side_by_side import in_order
+from surgisim.side_by_side import in_order
 
 BINS = 24
 LOW, HIGH = np.array([-0.7, -1.0, 2.0]), np.array([1.2, 1.0, 5.6])
@@ -39,18 +39,21 @@ to the other, more of it each round; none that was learned is used then. What a 
 def tool(frames: Frames, given: Given, settings: Masking, progress) -> tuple[np.ndarray, np.ndarray]:
     """Instrument pixels, and how clearly they stand out."""
     rgb, total = frames.rgb, len(frames.rgb)
-    inside, shine = lit(rgb), np.stack([highlights(frame) for frame in rgb])
-    seen = np.stack([features(frame) for frame in rgb])
-    bins = _bins(seen)
+    inside, shine = lit(rgb), np.stack(list(in_order(highlights, zip(rgb))))
+    seen = np.stack(list(in_order(features, zip(rgb))))
+    bins = np.stack(list(in_order(_bins, zip(seen))))
     motion = _motion(rgb, progress)
     marked = _clicks(frames.rgb.shape[:3], settings, motion)
     prior = _by_redness(seen) + marked
 
+    def region(frame: np.ndarray, evidence: np.ndarray, prior: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        smooth = settled(frame, evidence)
+        return smooth, solid(smooth > 0, prior)
+
     def regions(evidence: np.ndarray) -> np.ndarray:
-        smooth = list(in_order(settled, zip(rgb, evidence, strict=True)))
-        whole = np.stack([solid(s > 0, p) for s, p in zip(smooth, prior, strict=True)]) & inside
-        found = entering(whole, prior, shine, marked > 6)
-        return np.stack([bridged(m, s) for m, s in zip(found, smooth, strict=True)]) & inside & (marked > -6)
+        smooth, whole = zip(*in_order(region, zip(rgb, evidence, prior, strict=True)), strict=True)
+        found = entering(np.stack(whole) & inside, prior, shine, marked > 6)
+        return np.stack(list(in_order(bridged, zip(found, smooth, strict=True)))) & inside & (marked > -6)
 
     evidence, found = prior, regions(prior)
     for turn in range(ROUNDS):

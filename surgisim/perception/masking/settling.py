@@ -1,6 +1,7 @@
 """Neighbouring pixels of like colour agree on what they are."""
 
 import numpy as np
+from numba import njit
 
 STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 STRENGTH, ROUNDS = 0.3, 8
@@ -15,25 +16,28 @@ def settled(frame: np.ndarray, evidence: np.ndarray) -> np.ndarray:
     links = _links(frame.astype(np.float32))
     current = evidence
     for _ in range(ROUNDS):
-        belief = np.tanh(current / 2)
-        heard = np.zeros_like(belief)
-        for (down, right), weight in links:
-            heard += weight * np.roll(belief, (-down, -right), (0, 1))
-            heard += np.roll(weight * belief, (down, right), (0, 1))
-        current = evidence + STRENGTH * heard
+        current = evidence + STRENGTH * _heard(np.tanh(current / 2), links)
     return current
 
 
-def _links(frame: np.ndarray) -> list[tuple[tuple[int, int], np.ndarray]]:
-    """How much each pixel listens to its neighbour to the right, below, and on both diagonals below."""
+@njit(cache=True, nogil=True)
+def _heard(belief, links):
+    """What each pixel hears from its neighbours, (H, W)."""
+    height, width = belief.shape
+    out = np.zeros_like(belief)
+    for k in range(len(STEPS)):
+        down, right = STEPS[k]
+        for i in range(height - down):
+            for j in range(max(0, -right), width - max(0, right)):
+                out[i, j] += links[k, i, j] * belief[i + down, j + right]
+                out[i + down, j + right] += links[k, i, j] * belief[i, j]
+    return out
+
+
+def _links(frame: np.ndarray) -> np.ndarray:
+    """How much each pixel listens to its neighbour to the right, below, and on both diagonals below, (4, H, W); nothing
+    beyond the picture."""
     contrast = [((frame - np.roll(frame, (-d, -r), (0, 1))) ** 2).sum(-1) for d, r in STEPS]
     typical = 2 * contrast[0][:, :-1].mean() + 1e-6
-    links = []
-    for (down, right), difference in zip(STEPS, contrast, strict=True):
-        weight = np.exp(-difference / typical) / np.hypot(down, right)
-        if down:
-            weight[-1] = 0
-        if right:
-            weight[:, -1 if right > 0 else 0] = 0
-        links.append(((down, right), weight.astype(np.float32)))
-    return links
+    away = np.array([np.hypot(*step) for step in STEPS], np.float32)
+    return np.exp(-np.stack(contrast) / typical) / away[:, None, None]

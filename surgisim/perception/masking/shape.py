@@ -4,6 +4,8 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
+from surgisim.side_by_side import in_order
+
 CLEAR = 3.2
 """Evidence (3.9 at most) that a quarter of an instrument's own colours exceed: steel is not faintly grey."""
 
@@ -26,12 +28,8 @@ def entering(found: np.ndarray, evidence: np.ndarray, highlight: np.ndarray, cho
         kept[index] = clear and _is_instrument(region, inward[part[1:]], count, (height, width))
     kept[np.unique(label[chosen])] = True
     kept[0] = False
-    return np.stack(
-        [
-            _without_islands(m, e, h, inward, c)
-            for m, e, h, c in zip(kept[label], evidence, highlight, chosen, strict=True)
-        ]
-    )
+    each = zip(kept[label], evidence, highlight, [inward] * count, chosen, strict=True)
+    return np.stack(list(in_order(_without_islands, each)))
 
 
 def _is_clear(evidence: np.ndarray) -> bool:

@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 
 from surgisim.config.tracking import Tracking
-from surgisim.perception.side_by_side import in_order
 from surgisim.perception.tracking import Paths
 from surgisim.perception.tracking.between import sample
 from surgisim.perception.tracking.refine import Found, Templates, find, templates
 from surgisim.perception.tracking.warp import Warp, follow_surface
+from surgisim.side_by_side import in_order
 
 LIKE, STRANGE = 0.7, 0.2
 """Correlation with the first frame's patch from which a point is recognised; below which it cannot be that point."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from surgisim.perception.flow import carry, dense_flow, pixel_grid, round_trip
 from surgisim.perception.tracking.spread import spread
+from surgisim.side_by_side import in_order
 
 FORGET = 0.9
 """Share of a hidden pixel's own last motion, against its surroundings', that is kept per frame."""
@@ -32,6 +33,24 @@ class Warp:
     """Standard deviation of each coordinate [px], (H, W) float32."""
 
 
+@dataclass(frozen=True)
+class _Found:
+    """What a frame, pulled back to the first by some positions, has to do with it."""
+
+    begin: np.ndarray
+    """Those positions [px], (H, W, 2)."""
+    usable: np.ndarray
+    """Where they are in the picture and not hidden, (H, W) bool."""
+    pulled: np.ndarray
+    """The frame there, and the first where it is not usable, (H, W) uint8."""
+    there: np.ndarray
+    """The positions less the drift that flow finds [px], (H, W, 2)."""
+    loop: np.ndarray
+    """How far flow and flow back do not meet [px], (H, W)."""
+    alike: np.ndarray
+    """Correlation with the first frame once there, (H, W)."""
+
+
 def follow_surface(
     rgb: np.ndarray, hidden: np.ndarray, *, progress: Callable[[float, float, str], None] | None = None
 ) -> Iterator[Warp]:
@@ -40,11 +59,16 @@ def follow_surface(
     rgb: sRGB, (T, H, W, 3) uint8. hidden: pixels that do not show the surface, (T, H, W) bool.
     """
     grid = pixel_grid(*rgb.shape[1:3])
-    grey = [flat_light(frame) for frame in rgb]
+    grey = list(in_order(flat_light, zip(rgb)))
     now = Warp(grid.copy(), ~hidden[0], np.full(grid.shape[:2], 0.1, np.float32))
     yield now
-    for t in range(1, len(rgb)):
-        now = _advance(now, grey[0], grey[t - 1], grey[t], hidden[0], hidden[t - 1], hidden[t])
+
+    def beforehand(t: int) -> tuple[tuple[np.ndarray, np.ndarray], _Found]:
+        both = dense_flow(grey[t - 1], grey[t]), dense_flow(grey[t], grey[t - 1])
+        return both, _found(grid, grey[0], grey[t], hidden[0], hidden[t])
+
+    for t, known in enumerate(in_order(beforehand, zip(range(1, len(rgb)))), 1):
+        now = _advance(now, *known, grey[0], grey[t], hidden[0], hidden[t - 1], hidden[t])
         if progress:
             progress(t, len(rgb) - 1, "following the surface")
         yield now
@@ -71,10 +95,11 @@ def likeness(a: np.ndarray, b: np.ndarray, weight: np.ndarray, *, radius: float 
     return (mean(a * b) - ma * mb) / np.sqrt(np.maximum(va, 1.0) * np.maximum(vb, 1.0))
 
 
-def _advance(before: Warp, first, last, new, hidden_first, hidden_last, hidden_new) -> Warp:
+def _advance(before: Warp, both, from_rest: _Found, first, new, hidden_first, hidden_last, hidden_new) -> Warp:
+    """both: flow from the frame before and back to it. from_rest: see `_anchor`."""
     grid = pixel_grid(*first.shape)
-    guess, chained, step_error = _chain(before, last, new, hidden_last, hidden_new)
-    position, anchored, anchor_error, like = _anchor(guess, first, new, hidden_first, hidden_new, before)
+    guess, chained, step_error = _chain(before, *both, hidden_last, hidden_new)
+    position, anchored, anchor_error, like = _anchor(guess, from_rest, first, new, hidden_first, hidden_new, before)
     strange = 1.5 * np.clip(RECOGNISED - like, 0.0, 1.0)
     error = np.where(anchored, anchor_error, np.sqrt(before.error**2 + step_error**2 + strange**2))
     seen = (anchored | chained) & _shown(position, hidden_new) & ~hidden_first & (error < LOST)
@@ -87,10 +112,9 @@ def _advance(before: Warp, first, last, new, hidden_first, hidden_last, hidden_n
     return Warp(position.astype(np.float32), seen, np.where(seen, error, unsure).astype(np.float32))
 
 
-def _chain(before: Warp, last, new, hidden_last, hidden_new):
+def _chain(before: Warp, there, back, hidden_last, hidden_new):
     """Positions one frame on by flow: guess (H, W, 2), where flow tells it (H, W) bool, its error (H, W)."""
-    there, back = dense_flow(last, new), dense_flow(new, last)
-    reach = before.position - pixel_grid(*last.shape)
+    reach = before.position - pixel_grid(*hidden_last.shape)
     loop = carry(round_trip(there, back), reach)
     step = carry(there, reach)
     tells = before.seen & ~_at(hidden_last, before.position) & _shown(before.position + step, hidden_new)
@@ -99,7 +123,7 @@ def _chain(before: Warp, last, new, hidden_last, hidden_new):
     return before.position + step, tells, 0.1 + 0.5 * loop
 
 
-def _anchor(guess, first, new, hidden_first, hidden_new, before):
+def _anchor(guess, from_rest: _Found, first, new, hidden_first, hidden_new, before):
     """The guess less its drift against the first frame, where the first frame's texture is recognised.
 
     Tried from the guess, from what that gave, and from rest, where tissue that is let go returns to.
@@ -108,22 +132,15 @@ def _anchor(guess, first, new, hidden_first, hidden_new, before):
     best, good, error = guess, np.zeros(first.shape, bool), before.error
     like, far = np.full(first.shape, RECOGNISED, np.float32), 0.15 * max(first.shape)
     for attempt in range(3):
-        begin = (guess, best, grid)[attempt]
-        usable = _shown(begin, hidden_new) & ~hidden_first
-        pulled = cv2.remap(new, begin[..., 0], begin[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        pulled = np.where(usable, pulled, first)
+        found = from_rest if attempt == 2 else _found(best, first, new, hidden_first, hidden_new)
         if attempt == 0:
-            unmoved = likeness(first, pulled, usable)
-        drift, back = dense_flow(first, pulled), dense_flow(pulled, first)
-        loop = round_trip(drift, back)
-        alike = likeness(first, carry(pulled, drift), usable)
-        there = carry(begin, drift)
-        away = np.linalg.norm(there - guess, axis=-1)
-        near = (away < 1.5 + 3.0 * before.error) | ((away < far) & (alike > np.maximum(unmoved + 0.25, 0.75)))
-        better = usable & (loop < 0.7) & near & (alike > like + (0.02 if attempt else 0.0))
-        best = np.where(better[..., None], there, best)
-        like = np.where(better, alike, like)
-        error = np.where(better, 0.1 + 0.5 * loop, error)
+            unmoved = likeness(first, found.pulled, found.usable)
+        away = np.linalg.norm(found.there - guess, axis=-1)
+        near = (away < 1.5 + 3.0 * before.error) | ((away < far) & (found.alike > np.maximum(unmoved + 0.25, 0.75)))
+        better = found.usable & (found.loop < 0.7) & near & (found.alike > like + (0.02 if attempt else 0.0))
+        best = np.where(better[..., None], found.there, best)
+        like = np.where(better, found.alike, like)
+        error = np.where(better, 0.1 + 0.5 * found.loop, error)
         good |= better
         if attempt == 0:
             drift = spread(best - guess, good)
@@ -131,6 +148,15 @@ def _anchor(guess, first, new, hidden_first, hidden_new, before):
     moved = best - grid
     soft = cv2.GaussianBlur(moved, (0, 0), 1.0)
     return grid + np.where(good[..., None], soft, moved), good, error, np.where(good, like, unmoved)
+
+
+def _found(begin: np.ndarray, first, new, hidden_first, hidden_new) -> _Found:
+    usable = _shown(begin, hidden_new) & ~hidden_first
+    pulled = cv2.remap(new, begin[..., 0], begin[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    pulled = np.where(usable, pulled, first)
+    drift, back = in_order(dense_flow, ((first, pulled), (pulled, first)))
+    alike = likeness(first, carry(pulled, drift), usable)
+    return _Found(begin, usable, pulled, carry(begin, drift), round_trip(drift, back), alike)
 
 
 def _at(mask: np.ndarray, position: np.ndarray) -> np.ndarray:

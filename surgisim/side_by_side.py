@@ -1,4 +1,4 @@
-"""Frames worked on side by side, where what one of them gives does not depend on the others."""
+"""Work done side by side on as many threads as a job has, where what one part gives does not depend on the others."""
 
 import os
 from collections import deque
@@ -22,6 +22,16 @@ def in_order(work: Callable[..., Any], items: Iterable[tuple]) -> Iterator[Any]:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
+
+
+def ahead(items: Iterable[Any], count: int = 4) -> Iterator[Any]:
+    """The same items, each worked out on a thread of its own while those before it are used, `count` ahead at most."""
+    each, end = iter(items), object()
+    with ThreadPoolExecutor(1) as pool:
+        waiting = deque(pool.submit(next, each, end) for _ in range(count))
+        while (item := waiting.popleft().result()) is not end:
+            waiting.append(pool.submit(next, each, end))
+            yield item
 
 
 def threads() -> int:
