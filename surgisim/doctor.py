@@ -25,7 +25,7 @@ PACKAGES = ("surgisim", "snakemake", "numpy", "numba", "torch", "warp-lang", "op
 OPTIONAL = {
     "onnxruntime": "no learned masks (SAM 2)",
     "transformers": "no learned depth (Depth Anything v2)",
-    "gsplat": "scenes are fitted and drawn on the CPU (extra 'cuda')",
+    "gsplat": "scenes are fitted and drawn on the CPU; --profile gpu wants it (extra 'cuda')",
     "snakemake-executor-plugin-slurm": "no --profile slurm",
 }
 
