@@ -12,6 +12,7 @@ from surgisim.diagnosis.knobs import turned
 from surgisim.diagnosis.law import Law
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.uncertain import Spread
+from surgisim.estimation.identify import NINETY
 from surgisim.mpm.closing import follow
 from surgisim.mpm.setup import Prepared
 from surgisim.mpm.simulator import Breakdown, Run
@@ -103,7 +104,7 @@ def described(
     if draws:
         return _of_draws(h, amplitude, clip, draws)
     candidate = candidates.of(h)
-    known = Spread(amplitude, spread, 1.645 * float(base.spread[0]))
+    known = Spread(amplitude, spread, NINETY * float(base.spread[0]))
     knobs = candidate.knobs(h, amplitude)
     coarse = [turned(h, amplitude, knobs, x, clip) for x in np.random.default_rng(0).normal(size=(COARSE, len(knobs)))]
     result = _of_draws(h, amplitude, clip, coarse)

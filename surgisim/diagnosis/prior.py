@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surgisim.estimation.identify import NINETY
 from surgisim.recordings.recording import Recording
 
 START = np.array([np.log(5e3), 0.45, np.log(2e-3)])
@@ -13,8 +14,6 @@ LOGARITHMIC = {"E": 0, "eta / E": 2}
 """Numbers that may be known beforehand, and where they stand: of Poisson's ratio a coarse grid has one of its own."""
 SUREST = 0.15
 """Least spread of a number that is known beforehand, for another grid and a body of another form; chosen."""
-NINETY = 1.645
-"""Half of a 90 % interval over a standard deviation."""
 
 
 @dataclass(frozen=True)

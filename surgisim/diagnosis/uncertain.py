@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surgisim.estimation.identify import NINETY
+
 
 @dataclass(frozen=True)
 class Spread:
@@ -19,7 +21,7 @@ class Spread:
     def share(self) -> float:
         """Of the amplitudes' length [1]."""
         size = max(float(np.linalg.norm(self.amplitude)), 1e-30)
-        return min(1.645 * float(np.linalg.norm(self.each * self.amplitude)) / size**2, 0.95)
+        return min(NINETY * float(np.linalg.norm(self.each * self.amplitude)) / size**2, 0.95)
 
 
 Interval = Callable[[str, float, Spread], tuple[float, float]]

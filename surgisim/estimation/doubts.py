@@ -11,14 +11,13 @@ import numpy as np
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.doubts import Doubts
 from surgisim.artifacts.tracks import Tracks
+from surgisim.estimation.identify import NINETY
 from surgisim.estimation.otherwise import Otherwise
 from surgisim.estimation.search import Search
 from surgisim.estimation.trial import Trial, at_once
 from surgisim.estimation.view import View
 from surgisim.mpm.simulator import Breakdown
 
-NINETY = 1.645
-"""Standard deviations from the middle to either end of a 90 % interval."""
 ON_BODY = 0.05
 """How far from 1 the weights of a point on the body may sum."""
 

@@ -15,6 +15,8 @@ RESTS = 0.2
 FREE, FREELY = "release", 0.5
 """The phase in which no grip drives the tissue, and the least share of the information on E or eta that must
 come from there: while tissue is driven, an error of the grip's path in time looks like either."""
+NINETY = 1.645
+"""Standard deviations from the middle to either end of a 90 % interval."""
 TOLD = 0.1
 """A number counts as told by the clip when its posterior spread is at most this share of the prior's: a modulus to
 about 25 % either way (90 %), Poisson's ratio to about .02."""
@@ -55,12 +57,9 @@ def identifiability(
         by_phase = {n: float(((J[phase_of == k] @ direction) ** 2).sum()) for k, n in enumerate(phase_names)}
         total = sum(by_phase.values())
         low, high = (
-            (value * np.exp(-1.645 * sd), value * np.exp(1.645 * sd))
+            (value * np.exp(-NINETY * sd), value * np.exp(NINETY * sd))
             if logarithmic
-            else (
-                value - 1.645 * sd * size,
-                value + 1.645 * sd * size,
-            )
+            else (value - NINETY * sd * size, value + NINETY * sd * size)
         )
         edge = _at_edge(search, solution.x, direction)
         owed = {n: float(direction @ c @ direction) / alone**2 for n, c in model.items()}

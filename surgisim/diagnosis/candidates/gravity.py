@@ -11,6 +11,7 @@ from surgisim.diagnosis.hypothesis import RISE, Hypothesis, ease
 from surgisim.diagnosis.law import Law
 from surgisim.diagnosis.look import Look
 from surgisim.diagnosis.uncertain import Spread
+from surgisim.estimation.identify import NINETY
 
 NAME = "gravity"
 
@@ -38,7 +39,7 @@ def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:
 def interval(key: str, value: float, spread: Spread) -> tuple[float, float]:
     if key not in "xyz":
         return value, value
-    reach = float(np.hypot(1.645 * spread.each["xyz".index(key)], spread.by_stiffness * abs(value)))
+    reach = float(np.hypot(NINETY * spread.each["xyz".index(key)], spread.by_stiffness * abs(value)))
     return value - reach, value + reach
 
 
