@@ -12,6 +12,7 @@ from surgisim.lighting.headlight import to_srgb
 from surgisim.perception.depth import near_light, shading, stereo
 from surgisim.perception.depth.complete import complete
 from surgisim.perception.depth.distance import depth as of_frames
+from surgisim.perception.depth.guided import guided
 from surgisim.perception.tracking.between import sample
 from surgisim.problem import Problem
 
@@ -136,9 +137,27 @@ def test_a_right_view_is_matched_below_the_pixel_and_only_where_it_reaches():
     assert np.abs(refined - 7.3).mean() < 0.5 * np.abs(whole - 7.3).mean()
     cam = camera(96, 64, 2)
     given = Given(np.zeros((0, 64, 96), bool), NONE.reshape(0, 64, 96), np.stack([right] * 2), 0.004)
-    z, trust, _ = stereo.estimate(np.stack([left] * 2), np.zeros((2, 64, 96), bool), given, cam, distance=0.07)
+    guide = np.full((2, 64, 96), 0.07), np.full((2, 64, 96), 0.3)
+    hidden = np.zeros((2, 64, 96), bool)
+    z, trust, _ = stereo.estimate(np.stack([left] * 2), hidden, given, cam, guide, distance=0.07)
     assert z[0][:, 20:80] == pytest.approx(cam.fx * 0.004 / 7.3, rel=0.02)
     assert trust[:, 10:-10, 1:5].mean() < 0.5 * trust[:, 10:-10, 20:80].mean()
+
+
+def test_noise_is_averaged_along_the_guides_shape_and_neither_its_scale_nor_a_step_it_lacks_is_lost():
+    rng = np.random.default_rng(3)
+    y, x = np.indices((64, 96))
+    guide = np.stack([1.0 + 0.1 * np.exp(-((x - 60) ** 2 + (y - 32) ** 2) / 72) * t / 5 for t in range(6)])
+    true = 0.06 * guide * np.where(x < 20, 0.7, 1.0)
+    measured = true * np.exp(rng.normal(0, 0.01, true.shape))
+    known = rng.random(true.shape) < 0.8
+    specks = rng.random(true.shape) < 0.005
+    z, share = guided(guide, np.where(specks, 1.6 * measured, measured), known)
+    wrong = np.abs(np.log(z / true))
+    assert np.median(wrong) < 0.002
+    assert np.percentile(wrong[:, :, :14], 99) < 0.015
+    assert np.percentile(wrong[:, :, 26:], 99) < 0.015
+    assert share.min() > 0.5
 
 
 def test_what_was_not_seen_is_hardly_trusted():

@@ -43,9 +43,6 @@ def depth(
     name = choose(settings.backend, given_)
     if name == "given":
         z, confidence, scale = given.estimate(given_, hidden, camera, rgb, distance=settings.distance)
-    elif name == "stereo":
-        # The right view shows the instrument too.
-        z, confidence, scale = stereo.estimate(frames.rgb, hidden, given_, camera, distance=settings.distance)
     elif name == "depth_anything":
         z, confidence, scale = depth_anything.estimate(
             rgb, hidden, settings.weights, distance=settings.distance, range_=settings.range, progress=progress
@@ -63,6 +60,11 @@ def depth(
             progress=progress,
         )
         scale = "arbitrary"
+        if name == "stereo":
+            # The right view shows the instrument too.
+            z, confidence, scale = stereo.estimate(
+                frames.rgb, hidden, given_, camera, (z, confidence), distance=settings.distance
+            )
     follows = name != "near_light"
     confidence = np.where(inpainted.origin == SEEN, confidence, np.minimum(confidence, FLAT))
     return Depth(z.astype(np.float32), confidence.astype(np.float32), scale, follows)

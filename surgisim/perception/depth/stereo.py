@@ -1,9 +1,10 @@
-"""Depth from a second, rectified view: semi-global matching, then registration below the pixel.
+"""Depth from a second, rectified view: semi-global matching, registration below the pixel, light and motion as a guide.
 
 Hirschmueller, Stereo processing by semiglobal matching and mutual information, 2008, as OpenCV has it: right to a
 quarter of a pixel, and drawn to whole ones. How depth changes shows in less, so each pixel's neighbourhood is then
 shifted to where it fits the other view best (Lucas and Kanade, An iterative image registration technique with an
-application to stereo vision, 1981).
+application to stereo vision, 1981). What is left of noise is averaged away along the shape that light and motion
+suggest (guided.py).
 """
 
 import cv2
@@ -11,7 +12,7 @@ import numpy as np
 
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.given import Given
-from surgisim.perception.depth.complete import complete
+from surgisim.perception.depth.guided import guided
 from surgisim.perception.tracking.spread import spread
 from surgisim.problem import Problem
 
@@ -26,14 +27,18 @@ EDGE = 2
 """Columns at the other view's edge that nothing is matched with."""
 ROUNDS = 5
 """Of registration."""
+SURE = 0.9
+"""Confidence of what is measured all around."""
 
 
 def estimate(
-    rgb: np.ndarray, hidden: np.ndarray, given: Given, camera: Camera, *, distance: float
-) -> tuple[np.ndarray, np.ndarray, str]:
+    rgb: np.ndarray, hidden: np.ndarray, given: Given, camera: Camera, guide: tuple[np.ndarray, np.ndarray], *,
+    distance: float,
+) -> tuple[np.ndarray, np.ndarray, str]:  # fmt: skip
     """Depth [m], confidence (T, H, W) and whether its scale is known.
 
     rgb: left view as it was filmed, sRGB (T, H, W, 3) uint8. hidden: pixels that are not tissue's own, (T, H, W) bool.
+    guide: depth to any scale and its confidence by light and motion, (T, H, W) each.
     Without a baseline, or with a focal length that is only assumed, the median depth of frame 0 becomes `distance` [m].
     """
     if given.right.shape != rgb.shape:
@@ -50,11 +55,11 @@ def estimate(
             "Check that the two views are rectified and in order, or set depth.backend to 'near_light'."
         )
     disparity = np.stack([registered(*views) for views in zip(rgb, given.right, disparity, known, strict=True)])
-    z = measured(disparity, given.baseline or 1.0, camera)
-    z, trust = complete(z, known, ~hidden)
+    z, share = guided(guide[0], measured(disparity, given.baseline or 1.0, camera), known & (disparity > 0.5))
+    confidence = SURE * share + (1 - share) * guide[1]
     if given.baseline > 0 and camera.focal_from == "given":
-        return z, 0.9 * trust, "known"
-    return z * (distance / np.median(z[0][~hidden[0]] if (~hidden[0]).any() else z[0])), 0.9 * trust, "arbitrary"
+        return z, confidence, "known"
+    return z * (distance / np.median(z[0][~hidden[0]] if (~hidden[0]).any() else z[0])), confidence, "arbitrary"
 
 
 def match(left: np.ndarray, right: np.ndarray) -> np.ndarray:
