@@ -51,15 +51,20 @@ def ask_hold(
     if least >= without:
         return trial, x
     # The shape was fitted to a body that is held: another has to be fitted before they can be compared.
-    fits, shared = {}, None
+    fits = {}
+    shared: list[np.ndarray | None] = [None, None]
     for name in kinds:
         grip = min(grips, key=lambda grip, name=name: begins[name, grip][0])
         c, begin = begins[name, grip]
         if not c <= WORTH[name] * least:
             continue
-        best, there, jacobian = settle_pull([ways[name, grip]], begin, phase, history, say, shared, HEATS[0])
-        shared = jacobian if shared is None else shared
-        cost = cost_until((best, there), last=last)
+        # Where the fit of the shape ended may lie on another side of a ridge than where another body's ends.
+        tries = []
+        for k, start in enumerate((begin, begun)[: 1 if begin is begun else 2]):
+            best, there, jacobian = settle_pull([ways[name, grip]], start, phase, history, say, shared[k], HEATS[0])
+            shared[k] = jacobian if shared[k] is None else shared[k]
+            tries.append((cost_until((best, there), last=last), best, there, jacobian))
+        cost, best, there, jacobian = min(tries, key=lambda one: one[0])
         # It must be far better than the body as it is held in the end: what is worse after two steps is left.
         if cost <= RIVALS * without:
             best, there, _ = settle_pull([best], there, phase, history, say, jacobian)
