@@ -158,6 +158,10 @@ def test_noise_is_averaged_along_the_guides_shape_and_neither_its_scale_nor_a_st
     assert np.percentile(wrong[:, :, :14], 99) < 0.015
     assert np.percentile(wrong[:, :, 26:], 99) < 0.015
     assert share.min() > 0.5
+    known[3] = False
+    z, share = guided(guide, measured, known)
+    assert np.median(np.abs(np.log(z[3] / true[3]))) < 0.005
+    assert share[3].max() < 0.1
 
 
 def test_what_was_not_seen_is_hardly_trusted():

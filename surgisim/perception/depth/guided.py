@@ -30,7 +30,7 @@ CELL = 0.5
 def guided(guide: np.ndarray, z: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Depth [m] and how far each pixel's is measured, 0-1, (T, H, W) each.
 
-    guide: depth to any scale, z: measured [m], known: where, all (T, H, W).
+    guide: depth to any scale, z: measured [m], known: where (somewhere at least), all (T, H, W).
     """
     apart = np.log(np.where(known, z / guide, 1.0))
     low, high = np.percentile(apart[known], [0.5, 99.5])
@@ -57,4 +57,7 @@ def guided(guide: np.ndarray, z: np.ndarray, known: np.ndarray) -> tuple[np.ndar
         sure = (here & (share > LONE)).astype(np.float32)
         whole[t] = spread(summed / np.maximum(alike, 1e-6), sure)
         measured[t] = sure
+    # A frame in which nothing is measured has the ratio of the nearest one in which something is.
+    there = np.flatnonzero(measured.any((1, 2)))
+    whole = whole[there[np.abs(np.arange(len(z))[:, None] - there).argmin(1)]]
     return guide * np.exp(whole), np.minimum(gaussian_filter(measured, (0, side, side)), 1.0)
