@@ -95,7 +95,7 @@ class Tangent:
 def tangent(prepared: Prepared, values: Values, drive: Drive, run: Run, points: np.ndarray, until: int) -> Tangent:
     """Of a base run, for points at rest [m], (K, 3), and frames before `until`."""
     simulator = prepared.simulator
-    index, link = simulator.links(simulator.rest)
+    index, link = simulator.rest_links
     count, links = index.shape
     nodes = len(simulator.place)
     p, k = np.repeat(np.arange(count), links), index.ravel()

@@ -43,7 +43,7 @@ def numerical_damping(body, density: float, values: Values, held: np.ndarray, st
 def _energy(made, values: Values, drive, held: np.ndarray, u: np.ndarray, v: np.ndarray) -> float:
     """Of motion, of strained tissue, and of the base's springs [J]."""
     simulator = made.simulator
-    index, link = simulator.links(simulator.rest)
+    index, link = simulator.rest_links
     at = u.astype(float)[index]
     F = np.eye(3) + np.einsum("pka,pkb->pab", at, link[..., 1:])
     volume = simulator.volume_p

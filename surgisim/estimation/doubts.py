@@ -47,7 +47,7 @@ def doubts(
         except Breakdown:
             return None
 
-    here, *there = at_once(of, jobs)
+    here, *there = at_once(of, jobs, trial.workers)
     parts = [1.0] * (len(jobs) - 1 - len(others)) + [one.part for one in others]
     each = zip(jobs[1:], there, parts, strict=True)
     kept = [(name, (way - here) / part) for (name, *_), way, part in each if way is not None]

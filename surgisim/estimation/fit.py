@@ -61,7 +61,7 @@ from surgisim.estimation.search import PACE, search
 from surgisim.estimation.starts import choose_starts
 from surgisim.estimation.stated import by_phase
 from surgisim.estimation.support import EDGES, Support, open_depth
-from surgisim.estimation.trial import SAFETY, WORKERS, Trial
+from surgisim.estimation.trial import SAFETY, WORKERS, Trial, workers
 from surgisim.estimation.written import physics_of, unfitted
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
@@ -140,7 +140,7 @@ def estimate(
     reason = _nothing_to_learn(motion, tracks, body)
     if reason:
         return Estimate(*unfitted(make(body, motion), wanted, settings, camera, reason), motion, body, none(tracks))
-    bodies = [make(body, motion) for _ in range(WORKERS)]
+    bodies = [make(body, motion) for _ in range(workers(settings.device))]
     observation = observe(tracks, motion, camera, bodies[0].simulator, floor=FLOOR * body.spacing)
     total = len(frames.rgb)
     fitted = fitted_frames(frames.split)

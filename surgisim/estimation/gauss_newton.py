@@ -1,7 +1,8 @@
 """Least squares over a few parameters, with derivatives from simulations run side by side."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -86,13 +87,17 @@ def gauss_newton(
             w = share / np.maximum(1.0, np.abs(r) / WIDTH)
             H = (J * w[:, None]).T @ J + np.diag(1 / spread**2)
             g = (J * w[:, None]).T @ r + (x - prior) / spread**2
-            for pair in (*DAMPED[0], *(DAMPED[1] if fresh else ())):
-                trials = [stepped(x, H, g, f * damping, bounds) for f in pair]
+            pairs = [*DAMPED[0], *(DAMPED[1] if fresh else ())]
+            # As many pairs as there are workers for are tried at once, and the first that leads down is taken.
+            abreast = max(1, workers // len(pairs[0]))
+            for k in range(0, len(pairs), abreast):
+                factors = list(chain.from_iterable(pairs[k : k + abreast]))
+                trials = [stepped(x, H, g, f * damping, bounds) for f in factors]
                 results = all_of(trials)
                 costs = [cost_of(q, t) for q, t in zip(results, trials, strict=True)]
-                k = int(np.argmin(costs))
-                if costs[k] < cost:
-                    best = (trials[k], results[k], costs[k], pair[k] * damping)
+                lower = next((n for n in _lowest_of(costs, len(pairs[0])) if costs[n] < cost), None)
+                if lower is not None:
+                    best = (trials[lower], results[lower], costs[lower], factors[lower] * damping)
                     break
             if best is None and fresh:
                 return Solution(x, r, J)
@@ -112,6 +117,12 @@ def gauss_newton(
         stale = not fresh and (small or gained < RENEWED)
         J, fresh = (jacobian_at(x, r), True) if stale else (J, False)
     return Solution(x, r, J if fresh or not renewed else jacobian_at(x, r))
+
+
+def _lowest_of(costs: list[float], size: int) -> Iterator[int]:
+    """Of so many costs after one another each time, where the lowest is."""
+    for k in range(0, len(costs), size):
+        yield k + int(np.argmin(costs[k : k + size]))
 
 
 def stepped(

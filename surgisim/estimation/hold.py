@@ -40,10 +40,11 @@ def ask_hold(
     # What goes along may bear a firmer grip than what is held.
     grips = sorted({1.0, trial.grip})
     ways = {(name, grip): replace(one, grip=grip) for name, one in kinds.items() for grip in grips}
-    without, *along = at_once(partial(cost_until, last=last), [(one, x) for one in (alone, *ways.values())])
+    costs_of = partial(at_once, partial(cost_until, last=last), workers=trial.workers)
+    without, *along = costs_of([(one, x) for one in (alone, *ways.values())])
     begins = {way: (c, x) for way, c in zip(ways, along, strict=True)}
     broken = [way for way, c in zip(ways, along, strict=True) if not np.isfinite(c)]
-    again = at_once(partial(cost_until, last=last), [(ways[way], begun) for way in broken])
+    again = costs_of([(ways[way], begun) for way in broken])
     begins |= {way: (c, begun) for way, c in zip(broken, again, strict=True)}
     for (name, grip), (c, _) in begins.items():
         history.append({"round": "hold", "as": name, "grip": grip, "without": number(without), "cost": number(c)})

@@ -232,8 +232,13 @@ class Laying:
         if key not in mine:
             if len(mine) >= KEPT:
                 mine.pop(next(iter(mine)))
-            prepared = self.make(self.whole.laid(depth, rim=self.rim, base=self.base), motion)
-            mine[key] = prepared, self.observation.carried_by(prepared.simulator)
+            # Another worker's has all but its own arrays on the device.
+            laid = next(filter(None, (theirs.get(key) for theirs in list(self.kept.values()))), None)
+            if laid:
+                mine[key] = replace(laid[0], simulator=laid[0].simulator.beside()), laid[1]
+            else:
+                prepared = self.make(self.whole.laid(depth, rim=self.rim, base=self.base), motion)
+                mine[key] = prepared, self.observation.carried_by(prepared.simulator)
         return mine[key]
 
 

@@ -243,7 +243,7 @@ def answers(solution: Solution, changed: list[Otherwise], say: Say, region: np.n
         say(next(said), len(changed), f"if it were otherwise: {one.about}")
         return found
 
-    return at_once(of, changed)
+    return at_once(of, changed, changed[0].trial.workers)
 
 
 def better(solution: Solution, wanted: Search, found: list[Answer], region: np.ndarray) -> Answer | None:

@@ -95,14 +95,12 @@ def refine(
     pairs = cKDTree(simulator.rest).query(simulator.rest, neighbours + 1)[1]
     own, other = np.repeat(pairs[:, 0], neighbours), pairs[:, 1:].ravel()
 
-    def field(s: np.ndarray) -> np.ndarray:
-        whole = theta.copy()
-        most = np.minimum(limits[1][columns], FIRMEST * theta[:, columns])
-        whole[:, columns] = np.clip(theta[:, columns] * np.exp(s), limits[0][columns], most)
-        return whole
+    even = theta[:, columns]
+    low, high = np.log(limits[0][columns] / even), np.log(np.minimum(limits[1][columns] / even, FIRMEST))
 
     def tried(s: np.ndarray) -> _Tried:
-        now = field(s)
+        s, now = np.clip(s, low, high), theta.copy()
+        now[:, columns] = even * np.exp(s)
         path, run = simulated(now)
         track, u_bar = _track_loss(observation, run.u, train)
         picture = 0.0
@@ -126,29 +124,36 @@ def refine(
     history = [_row(0, at)]
     free = np.ones((len(theta), 1))
     slope, past = slope_at(at), _Past(partial(_smoothed, pairs=pairs))
-    way, rate, tries, pays = past.way(slope, free), 1.0, 0, True
+
+    def onward() -> np.ndarray:
+        """The step down from here, (P, M); what is at its limit and would go beyond it stays there."""
+        stays = ((at.s <= low) & (slope > 0)) | ((at.s >= high) & (slope < 0))
+        return past.way(slope, free * ~stays)
+
+    way, rate, tries, pays = onward(), 1.0, 0, True
     while pays and len(history) <= iterations and tries < TRIES * iterations:
-        if rate * _size(free * way) < LEAST:
+        if rate * _size(way) < LEAST:
             if not past.steps:
                 break
             # What the last steps told misleads here: begin anew, straight down.
             past.forget()
-            way, rate = past.way(slope, free), 1.0
+            way, rate = onward(), 1.0
             continue
         k, tries = len(history), tries + 1
         said = f"refinement {k}/{iterations}, misfit {at.track:.3f}, on kept frames {at.judged:.3f}"
         progress(k, iterations + 1, said)
         try:
-            new = tried(at.s + rate * free * way)
+            new = tried(at.s + rate * way)
         except Breakdown as breakdown:
             # A field that cannot be simulated is no candidate. Where it broke, tissue stays as it is from there on.
             if breakdown.particle is not None:
                 away = np.linalg.norm(simulator.rest - simulator.rest[breakdown.particle], axis=1)
-                free *= 1 - np.exp(-((away / (STAYS * simulator.grid.spacing)) ** 2))[:, None]
+                stays = 1 - np.exp(-((away / (STAYS * simulator.grid.spacing)) ** 2))[:, None]
+                free, way = free * stays, way * stays
             rate *= SHORTER[1]
             continue
         if new.loss >= at.loss:
-            rate *= _shorter(rate * float((slope * free * way).sum()), new.loss - at.loss)
+            rate *= _shorter(rate * float((slope * way).sum()), new.loss - at.loss)
             continue
         before, steeper = at, slope
         at = new
@@ -159,7 +164,7 @@ def refine(
         if pays and k < iterations:
             slope = slope_at(at)
             past.met(at.s - before.s, slope - steeper)
-            way, rate = past.way(slope, free), 1.0
+            way, rate = onward(), 1.0
     kept = best.judged < begun.judged * (1 - 0.01)
     return Refined(best.theta if kept else theta, bool(kept), history)
 
@@ -190,21 +195,26 @@ class _Past:
         self.begins = BEGINS
 
     def way(self, slope: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """The step down from where the slope is this, (P, M); free: share of it that may be made, (P, 1)."""
-        way = self._toward_bottom(slope) if self.steps else None
-        if way is None or (free * way * slope).sum() >= 0:
-            way = -self.smooth(slope)
+        """The step down from where the slope is this, (P, M); free: share of it that may be made, (P, M)."""
+        way = self._toward_bottom(slope, free) if self.steps else None
+        if way is None or (way * slope).sum() >= 0:
+            way = -free * self.smooth(free * slope)
             return self.begins * way / (_size(way) + 1e-30)
         return way * min(1.0, MOST / _size(way))
 
-    def _toward_bottom(self, slope: np.ndarray) -> np.ndarray:
-        left, shares = slope.copy(), []
-        for step, change in reversed(self.steps):
+    def _toward_bottom(self, slope: np.ndarray, free: np.ndarray) -> np.ndarray | None:
+        """None where the past tells nothing of what is free."""
+        told = [(free * step, free * change) for step, change in self.steps]
+        told = [(step, change) for step, change in told if (step * change).sum() > 0]
+        if not told:
+            return None
+        left, shares = free * slope, []
+        for step, change in reversed(told):
             shares.append((step * left).sum() / (step * change).sum())
             left -= shares[-1] * change
-        step, change = self.steps[-1]
-        way = self.smooth(left) * (step * change).sum() / (change * self.smooth(change)).sum()
-        for (step, change), share in zip(self.steps, reversed(shares), strict=True):
+        step, change = told[-1]
+        way = free * self.smooth(left) * (step * change).sum() / (change * self.smooth(change)).sum()
+        for (step, change), share in zip(told, reversed(shares), strict=True):
             way += step * (share - (change * way).sum() / (step * change).sum())
         return -way
 

@@ -19,7 +19,7 @@ from surgisim.estimation.gauss_newton import Solution, gauss_newton, misfit
 from surgisim.estimation.observation import PHASES
 from surgisim.estimation.search import Search
 from surgisim.estimation.support import MIDDLE, SHARES, edges_of
-from surgisim.estimation.trial import WORKERS, Trial, at_once
+from surgisim.estimation.trial import Trial, at_once
 from surgisim.mpm.grip import runs
 from surgisim.mpm.simulator import Breakdown
 from surgisim.mpm.stable import shear_speed
@@ -122,7 +122,7 @@ def choose_support(trial: Trial, phase: np.ndarray, history: list, say: Say) -> 
             x[nearer] += share * wanted.spread[nearer]
         points.append(np.clip(x, *wanted.bounds))
     say(0.03, 1.0, f"comparing {len(points)} ways the body may be held")
-    costs = at_once(partial(cost_until, last=last), [(trial, x) for x in points])
+    costs = at_once(partial(cost_until, last=last), [(trial, x) for x in points], trial.workers)
     x = points[int(np.argmin(costs))]
     found = edges_of(wanted.depth, trial.laying.columns.spacing)
     return [replace(trial, laying=trial.laying.ending(*end)) for end in found], x
@@ -223,7 +223,7 @@ def _some(
     found = gauss_newton(
         lambda y, worker: trial.residual(whole(y), worker, last), x[free], prior=wanted.start[free],
         spread=wanted.spread[free], differences=trial.differences[free], bounds=(low, high),
-        share=INDEPENDENT, iterations=iterations, workers=WORKERS,
+        share=INDEPENDENT, iterations=iterations, workers=trial.workers,
         said=lambda iteration, y, cost: said(iteration, whole(y), cost), renewed=False,
         together=lambda ys: trial.together([whole(y) for y in ys], last), jacobian=jacobian,
     )  # fmt: skip
@@ -263,7 +263,7 @@ def descend(
                     bounds=wanted.bounds,
                     share=INDEPENDENT,
                     iterations=settings.iterations,
-                    workers=WORKERS,
+                    workers=trial.workers,
                     said=said,
                     together=partial(trial.together, last=last),
                     jacobian=jacobian,

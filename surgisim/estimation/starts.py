@@ -138,7 +138,7 @@ def ring_downs(trial: Trial, begin: np.ndarray, free: Freed) -> list[tuple[np.nd
         except Breakdown:
             return never
 
-    return at_once(at, list(DAMPING))
+    return at_once(at, list(DAMPING), trial.workers)
 
 
 def _ring_down(

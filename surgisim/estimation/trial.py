@@ -23,8 +23,11 @@ from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.physics.catalogue import choose
 from surgisim.problem import Problem
+from surgisim.side_by_side import threads
 
-WORKERS = 2
+WORKERS, ABREAST = 2, 6
+"""Simulations that a search runs at once on processors, and at most where a GPU steps them, most of which a body leaves
+idle."""
 SAFETY = 0.9
 """Share of the largest stable step that is used."""
 STRIDES = (1.4, 1.2)
@@ -63,6 +66,11 @@ class Trial:
     eased: float | None = None
     """Logarithm of how many times stiffer (softer, where negative) than at the search's start tissue is simulated
     whose pace nothing in the clip tells, whatever x says of it; None where x says it."""
+
+    @property
+    def workers(self) -> int:
+        """Simulations that may run at once."""
+        return len(self.bodies)
 
     def stand(self, x: np.ndarray, worker: int = 0) -> tuple["Trial", Motion]:
         """This trial with the body that x asks for, and how that is carried."""
@@ -195,7 +203,7 @@ class Trial:
             return isinstance(run, Run) and np.linalg.norm(run.u - stable.u) <= SAME * np.linalg.norm(stable.u)
 
         longest, *others = STRIDES
-        stable, run = at_once(at, [1.0, longest], min(WORKERS, len(self.bodies)))
+        stable, run = at_once(at, [1.0, longest], self.workers)
         if isinstance(stable, Problem):
             raise stable
         if same(run):
@@ -236,7 +244,7 @@ class Trial:
     def together(self, points: list[np.ndarray], last: int | None = None) -> list[np.ndarray | None]:
         """`residual` at several x: side by side in one run on a GPU, on two threads on a CPU."""
         if self.bodies[0].simulator.device == "cpu" or self.laying:
-            return at_once(lambda x, worker: self.residual(x, worker, last), points)
+            return at_once(lambda x, worker: self.residual(x, worker, last), points, self.workers)
         last = int(self.fitted[-1]) if last is None else last
         values = [self.values(x) for x in points]
         # One step for all: the smallest of theirs.
@@ -250,6 +258,11 @@ class Trial:
     def batch(self) -> Batch:
         """As many bodies as parameters are usually varied at once."""
         return Batch(self.bodies[0], max(4, len(self.wanted.start)))
+
+
+def workers(device: str) -> int:
+    """Simulations that a search runs at once on a device."""
+    return min(ABREAST, max(WORKERS, threads())) if device == "cuda" else WORKERS
 
 
 def at_once(work: Callable[[Any, int], Any], items: list[Any], workers: int = WORKERS) -> list[Any]:

@@ -6,6 +6,7 @@ from scipy import sparse
 from surgisim.mpm.extension import extension
 from surgisim.mpm.grid import Grid
 from surgisim.mpm.kink import Ball, Kinks
+from surgisim.mpm.links import links_through
 from surgisim.mpm.tear import Severing
 
 
@@ -27,6 +28,8 @@ class Nodes:
         index, link = self._spline_links(rest)
         self.kinks = Kinks(balls, grid.spacing, len(self.place), index, link, rest, volume)
         self.place = np.concatenate([self.place, np.full(self.kinks.count, -1, self.place.dtype)])
+        self.rest_links = self.kinks.added(rest, index, link)
+        """Of particles at rest, as `links` gives them."""
 
     def stencil(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """As Grid.stencil; a link across the cut leads to the node's copy on the point's own side, N further on."""
@@ -44,31 +47,17 @@ class Nodes:
         return self.kinks.added(points, *self._spline_links(points))
 
     def _spline_links(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        nodes, weight, gradient = self.stencil(points)
-        rows = np.repeat(np.arange(len(nodes)), 27)
-        size = (len(nodes), self.rule.shape[0])
-        parts = [
-            (sparse.csr_matrix((values.ravel(), (rows, nodes.ravel())), size) @ self.rule).tocsr()
-            for values in (weight, *np.moveaxis(gradient, -1, 0))
-        ]
-        # One pattern for the four: where one of them happens to be zero, the others need not be.
-        pattern = sum(abs(p) for p in parts).tocsr()
-        pattern.sort_indices()
-        lengths = np.diff(pattern.indptr)
-        row = np.repeat(np.arange(len(nodes)), lengths)
-        column = np.arange(pattern.nnz) - np.repeat(pattern.indptr[:-1], lengths)
-        index = np.zeros((len(nodes), max(1, int(lengths.max(initial=1)))), np.int32)
-        first = np.where(lengths > 0, pattern.indices[np.minimum(pattern.indptr[:-1], max(pattern.nnz - 1, 0))], 0)
-        index[:] = first[:, None]
-        index[row, column] = pattern.indices
-        link = np.zeros((*index.shape, 4))
-        for k, part in enumerate(parts):
-            link[row, column, k] = np.asarray(part[row, pattern.indices]).ravel()
-        return index, link
+        return links_through(*self.stencil(points), self.rule)
 
     def carry(self, points: np.ndarray) -> sparse.csr_matrix:
         """Interpolation from solid nodes to points [m], (Q, 3), (Q, A); see `support` for how far a point has one."""
-        index, link = self.links(points)
+        return self._interpolation(*self.links(points))
+
+    def carry_rest(self) -> sparse.csr_matrix:
+        """The same to the particles at rest, (P, A)."""
+        return self._interpolation(*self.rest_links)
+
+    def _interpolation(self, index: np.ndarray, link: np.ndarray) -> sparse.csr_matrix:
         rows = np.repeat(np.arange(len(index)), index.shape[1])
         return sparse.csr_matrix((link[..., 0].ravel(), (rows, index.ravel())), (len(index), len(self.place)))
 

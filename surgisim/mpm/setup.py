@@ -151,7 +151,7 @@ class Prepared:
     @cached_property
     def _carried(self) -> sparse.csr_matrix:
         """Nodes to particles, (P, A)."""
-        return self.simulator.carry(self.simulator.rest)
+        return self.simulator.carry_rest()
 
 
 def prepare(

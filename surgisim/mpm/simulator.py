@@ -7,7 +7,10 @@ memory allowed is walked in several stretches.
 
 import math
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass
+from threading import Lock
+from typing import Self
 
 import numpy as np
 import warp as wp
@@ -29,6 +32,7 @@ from surgisim.problem import Problem
 wp.config.log_level = wp.LOG_WARNING
 
 NEVER = 2**31 - 1
+LOADING = Lock()
 
 State = tuple[np.ndarray, ...]
 """u, v over solid nodes, (A, 3) each, and, where a law has memory, q, (P, S)."""
@@ -113,13 +117,21 @@ class Simulator(Nodes):
         super().__init__(grid, self.rest, self.volume_p, cut, balls)
         self.types, self.threads = shapes(precision), threads
         self.real = np.float32 if precision == "single" else np.float64
-        local, links = self.links(self.rest)
+        local, links = self.rest_links
         # A kink's weights sum to nothing: its inertia is what keeps it as slow as a cell.
         inertia = grid.spacing**2 * (links[..., 1:] ** 2).sum(-1)
         self._local, self._weight = local, np.where(local < self.rule.shape[1], links[..., 0], inertia)
         self.gravity, self.stream = self.types.Vec(*gravity), Stream(device)
         with self.stream.turn():
             self._settle(local, links)
+
+    def beside(self) -> Self:
+        """The same body with device arrays of its own, for another thread."""
+        other = copy(self)
+        other.stream = Stream(self.device)
+        with other.stream.turn():
+            other._settle(*self.rest_links)
+        return other
 
     def _settle(self, local: np.ndarray, links: np.ndarray) -> None:
         """What every run needs, on the device; local and links as of `Nodes.links`."""
@@ -139,9 +151,13 @@ class Simulator(Nodes):
             kinds = [(len(self.place), s.Vec)] * 2 + [(self.count if self.width else 1, self.laws.Memory)]
             self.hosts = [wp.empty(n, dtype=kind, device="cpu", pinned=True) for n, kind in kinds]
             self.hosts.append(wp.empty(self.trouble.shape, dtype=int, device="cpu", pinned=True))
-        # Loaded here, once: two threads that load one module at their first launch crash the process.
-        for kernel in (self.layout.kernels.step, self.layout.kernels.adjoint, *vars(self.nodes).values(), tick):
-            wp.load_module(kernel.module, device=device)
+        self._loaded(self.layout.kernels.step, *vars(self.nodes).values(), tick)
+
+    def _loaded(self, *kernels: wp.Kernel) -> None:
+        """Load what is about to be launched, once: two threads that load one module together crash the process."""
+        with LOADING:
+            for kernel in kernels:
+                wp.load_module(kernel.module, device=self.device)
 
     def node_mass(self, density: np.ndarray) -> np.ndarray:
         """Mass of the solid nodes [kg], (A,), for a density at every particle [kg/m^3], (P,)."""
@@ -318,6 +334,8 @@ class Simulator(Nodes):
 
     def _back(self, task: "_Task", drive: Drive, springs: bool) -> "_Back":
         """Device arrays and recorded launches of the way back; nothing is stepped by recording them."""
+        # Many bodies never go back, and this is the longest to compile.
+        self._loaded(self.layout.kernels.adjoint)
         s, heavy, parts = self.types, bool(self.laws.mass), self.layout.parts
         f = self._zeros(len(self.place), s.Vec)
         u, v = (self._zeros((parts, len(self.place)), s.Vec) for _ in range(2))

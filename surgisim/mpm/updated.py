@@ -54,7 +54,7 @@ class Updated(Nodes):
         self.rest, self.volume_p, self.density = np.asarray(rest, float), np.asarray(volume, float), float(density)
         self.count, self.terms, self.device, self.gravity = len(rest), tuple(terms), device, gravity
         super().__init__(grid, self.rest, self.volume_p, None)
-        weights = self.carry(self.rest)
+        weights = self.carry_rest()
         normal = (weights.T @ weights).tocsc()
         ridge = 1e-9 * normal.diagonal().max() * sparse.identity(normal.shape[0], format="csc")
         solve = factorized(normal + ridge)

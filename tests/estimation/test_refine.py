@@ -45,10 +45,10 @@ class Seen:
         return bar
 
 
-def refined(named: bool):
+def refined(named: bool, seen=None):
     body, start = Body(named), np.ones((len(Body.rest), 1))
     return refine(
-        body, lambda theta: (None, body.run(theta, None)), start, [0], Seen(),
+        body, lambda theta: (None, body.run(theta, None)), start, [0], seen or Seen(),
         train=np.array([0]), judge=np.array([1]), image=None, image_weight=0.0,
         iterations=40, smoothness=0.0, limits=(np.array([1e-3]), np.array([1e3])),
     )  # fmt: skip
@@ -74,7 +74,7 @@ def test_every_step_that_is_kept_fits_better():
 
 
 def test_where_the_last_steps_mislead_it_goes_straight_down_again(monkeypatch):
-    def nearly_level(past, slope):
+    def nearly_level(past, slope, free):
         level = np.random.default_rng(0).normal(size=slope.shape)
         level -= (level * slope).sum() / (slope * slope).sum() * slope
         return 0.1 * level - 1e-12 * slope
@@ -84,3 +84,19 @@ def test_where_the_last_steps_mislead_it_goes_straight_down_again(monkeypatch):
     history = refined(named=True).history
     assert len(history) > 8
     assert history[-1]["judged"] < 0.5 * history[0]["judged"]
+
+
+class Apart(Seen):
+    """Of which one half ought to be far firmer than anything may become."""
+
+    ought = np.where(Body.rest[:, :1] < 0.5, 10.0, SOFT)
+
+    def residual(self, u, frames):
+        return (u[frames] - self.ought).swapaxes(0, 1)
+
+
+def test_what_is_at_its_limit_does_not_keep_the_rest_from_going_on(monkeypatch):
+    monkeypatch.setattr(Body, "breaks", 0.0)
+    found, soft = refined(named=True, seen=Apart()).theta, Body.rest[:, 0] > 0.7
+    assert found.max() == pytest.approx(room.FIRMEST)
+    assert np.log(found[soft]).mean() == pytest.approx(SOFT, abs=0.1)

@@ -24,6 +24,7 @@ def edge(ratio: float, stays: float) -> SimpleNamespace:
         return np.concatenate([np.full(3000, 8 * (x[NU] - begin - ratio)), np.full(3000, stays)])
 
     return SimpleNamespace(
+        workers=2,
         wanted=WANTED,
         laying=None,
         motion=pulled(20),

@@ -66,8 +66,7 @@ def _survey(recording: Recording, fps: float, settings: Ingest) -> tuple[np.ndar
             )
         if index < begin:
             continue
-        level = frame.max(-1)
-        top = level if top is None else np.maximum(top, level)
+        top = frame.copy() if top is None else np.maximum(top, frame, out=top)
         small.append(thumbnail(frame))
     if len(small) < 2:
         raise Problem(
@@ -75,6 +74,7 @@ def _survey(recording: Recording, fps: float, settings: Ingest) -> tuple[np.ndar
             f"{'the end' if settings.end is None else f'{settings.end} s'} of {index + 1} read, but at least 2 are "
             "wanted to see anything move. Pass a longer recording."
         )
+    top = top.max(-1)
     if is_black(top):
         raise Problem(f"{recording.where}: every frame is black. Pass a recording that shows something.")
     kept, repeat = shown_again(np.stack(small)) if settings.drop_duplicates else (np.arange(len(small)), 1)
