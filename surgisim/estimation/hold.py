@@ -1,5 +1,6 @@
 """How a body is held: below and along its edge, along its edge alone, or in a piece that goes along with a grip."""
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -8,7 +9,7 @@ import numpy as np
 
 from surgisim.estimation.pieces import Piece
 from surgisim.estimation.rim import Rim
-from surgisim.estimation.rounds import HEATS, RIVALS, cost_until, last_driven, number, settle_pull
+from surgisim.estimation.rounds import HEATS, RIVALS, STEPPED, cost_until, last_driven, number, settle_pull
 from surgisim.estimation.trial import Trial, at_once
 
 MOVED = 0.9
@@ -52,32 +53,35 @@ def ask_hold(
     if least >= without:
         return trial, x
     # The shape was fitted to a body that is held: another has to be fitted before they can be compared.
-    fits = {}
     shared: list[np.ndarray | None] = [None, None]
-    for name in kinds:
-        grip = min(grips, key=lambda grip, name=name: begins[name, grip][0])
-        c, begin = begins[name, grip]
-        if not c <= WORTH[name] * least:
-            continue
+
+    def fitted(name: str, _: int = 0) -> tuple[str, tuple[float, Trial, np.ndarray], list]:
+        rows: list = []
+        grip = min(grips, key=lambda grip: begins[name, grip][0])
+        begin, tries = begins[name, grip][1], []
         # Where the fit of the shape ended may lie on another side of a ridge than where another body's ends.
-        tries = []
         for k, start in enumerate((begin, begun)[: 1 if begin is begun else 2]):
-            best, there, jacobian = settle_pull([ways[name, grip]], start, phase, history, say, shared[k], HEATS[0])
+            best, there, jacobian = settle_pull([ways[name, grip]], start, phase, rows, say, shared[k], HEATS[0])
             shared[k] = jacobian if shared[k] is None else shared[k]
             tries.append((cost_until((best, there), last=last), best, there, jacobian))
         cost, best, there, jacobian = min(tries, key=lambda one: one[0])
         # It must be far better than the body as it is held in the end: what is worse after two steps is left.
         if cost <= RIVALS * without:
-            best, there, _ = settle_pull([best], there, phase, history, say, jacobian)
+            best, there, _ = settle_pull([best], there, phase, rows, say, jacobian)
             cost = cost_until((best, there), last=last)
-        history.append({"round": "hold", "as": name, "without": number(without), "cost": number(cost)})
-        fits[name] = cost, best, there
+        rows.append({"round": "hold", "as": name, "without": number(without), "cost": number(cost)})
+        return name, (cost, best, there), rows
+
+    first, *others = [n for n in kinds if min(begins[n, grip][0] for grip in grips) <= WORTH[n] * least]
+    found = [fitted(first), *at_once(fitted, others, max(1, trial.workers // STEPPED))]
+    history += itertools.chain.from_iterable(rows for *_, rows in found)
+    fits = {name: fit for name, fit, _ in found}
     chosen, least = (trial, x), without
     # A body in pieces has to be as much better again than one in a single piece.
     for names in (ONE_PIECE, IN_PIECES):
-        cost, *found = min((fits[n] for n in names if n in fits), key=lambda fit: fit[0], default=(np.inf,))
+        cost, *best = min((fits[n] for n in names if n in fits), key=lambda fit: fit[0], default=(np.inf,))
         if cost < MOVED * least:
-            chosen = tuple(found)
+            chosen = tuple(best)
         least = min(least, cost)
     return chosen
 

@@ -8,6 +8,7 @@ import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.fft import dct
@@ -41,6 +42,8 @@ HEATS, FINALISTS = (2, 4), 2
 FAR, LAGS = 0.95, 3
 """Share of its longest way from which a pull has shown its shape, and fitted frames more, in which tissue that lags
 comes along; what is seen later shows it again."""
+STEPPED = 3
+"""Simulations that a descent has to run at once, on the whole: a few more for a derivative, two for a step."""
 SETTLED = 4
 """Frames after a release that the first window must hold, or it says nothing of modulus and viscosity."""
 
@@ -175,32 +178,48 @@ def settle_pull(
     work, done = sum(entrants * iterations for entrants, iterations in heats), 0
 
     def settled(
-        trial: Trial, begin: np.ndarray, iterations: int, jacobian: np.ndarray | None
-    ) -> tuple[float, Trial, np.ndarray, np.ndarray | None]:
+        trial: Trial, begin: np.ndarray, jacobian: np.ndarray | None, iterations: int, done: int
+    ) -> tuple[tuple[float, Trial, np.ndarray, np.ndarray | None], list]:
+        rows: list = []
+
         def said(iteration: int, y: np.ndarray, cost: float) -> None:
             values = {n: float(f"{v:.4g}") for n, v in plain(wanted, y).items()}
             edge = {"beyond": trial.laying.margin, "rim": trial.laying.rim} if trial.laying else {}
-            history.append({"round": "pull", "last_frame": last, "iteration": iteration, "cost": cost} | edge | values)
+            rows.append({"round": "pull", "last_frame": last, "iteration": iteration, "cost": cost} | edge | values)
             part = 0.06 * (1 + (done + iteration) / work)
             say(part, 1.0, f"shape of the pull, iteration {iteration}: {values}")
 
         try:
             found = _some(trial, begin, slow, last, iterations, said, jacobian)
         except Breakdown as breakdown:
-            history.append({"round": "pull", "last_frame": last, "cost": None, "broke": str(breakdown)})
-            return np.inf, trial, begin, jacobian
-        return cost_of(found.residual, found.x, wanted), trial, found.x, found.jacobian
+            rows.append({"round": "pull", "last_frame": last, "cost": None, "broke": str(breakdown)})
+            return (np.inf, trial, begin, jacobian), rows
+        return (cost_of(found.residual, found.x, wanted), trial, found.x, found.jacobian), rows
 
     field: list[tuple[float, Trial, np.ndarray, np.ndarray | None]] = [(0.0, trial, x, jacobian) for trial in trials]
     for entrants, iterations in heats:
-        run, shared = [], None
-        for _, trial, begin, own in field[:entrants]:
-            # Another edge bends how the pull's shape answers a little, which the steps correct.
-            run.append(settled(trial, begin, iterations, shared if own is None else own))
-            shared = run[-1][-1] if shared is None else shared
-            done += iterations
-        field = sorted(run, key=lambda one: one[0])
+        jobs = [(*one[1:], iterations, done + n * iterations) for n, one in enumerate(field[:entrants])]
+        run = led(settled, jobs, trials[0].workers)
+        history += itertools.chain.from_iterable(rows for _, rows in run)
+        field, done = sorted((one for one, _ in run), key=lambda one: one[0]), done + entrants * iterations
     return field[0][1:]
+
+
+def led(settled: Callable[..., Any], jobs: list[tuple], workers: int) -> list[Any]:
+    """settled(*job) of every job, in order; those without a derivative take the first one's, which is asked for first.
+
+    A job is a trial, where it begins, a derivative, and what else is asked for; what comes of it begins with a tuple
+    that ends in a derivative. Another edge bends how the pull's shape answers a little, which the steps correct.
+    workers: of each trial; as many as hardly fill them go side by side.
+    """
+    first = settled(*jobs[0])
+    shared = first[0][-1]
+
+    def of(job: tuple, _: int) -> Any:
+        trial, begin, own, *more = job
+        return settled(trial, begin, shared if own is None else own, *more)
+
+    return [first, *at_once(of, jobs[1:], max(1, workers // STEPPED))]
 
 
 def _some(

@@ -58,7 +58,7 @@ def _survey(recording: Recording, fps: float, settings: Ingest) -> tuple[np.ndar
     stop = min(room, end) if end is not None else room
     top, small, index = None, [], -1
     for index, frame in _part(recording, stop):
-        if top is not None and frame.shape[:2] != top.shape:
+        if top is not None and frame.shape != top.shape:
             h, w = frame.shape[:2]
             raise Problem(
                 f"{recording.where}: frame {index} is {w} x {h} px, but those before are {top.shape[1]} x "
