@@ -102,7 +102,7 @@ def demo(
     told = [] if any(s.startswith("phantom.") for s in set_ or ()) else [f"focal={camera.focal * camera.width:g}"]
     if told and not config:
         # More iterations make its small pictures, where they are held out, better by .1 dB.
-        told.append("reconstruction.iterations=3000")
+        told.append("reconstruction.iterations=2500")
     run(
         clip="phantom",
         name="demo",

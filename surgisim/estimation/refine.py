@@ -19,7 +19,7 @@ from surgisim.estimation.observation import Observation
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.simulator import Breakdown, Run, Simulator
 
-BEGINS, LEAST, MOST = 0.05, 0.001, 0.5
+BEGINS, LEAST, MOST = 0.1, 0.001, 0.5
 """Root mean square of the first step in the logarithm, of one below which none is tried any more, and of the longest;
 chosen, as what follows."""
 LONGER = 2.0

@@ -14,11 +14,11 @@ def asked(monkeypatch, *arguments):
 
 
 def test_the_embedded_clip_tells_its_focal_length(monkeypatch):
-    assert asked(monkeypatch) == ["focal=192", "reconstruction.iterations=3000"]
+    assert asked(monkeypatch) == ["focal=192", "reconstruction.iterations=2500"]
 
 
 def test_what_is_set_by_hand_comes_after(monkeypatch):
-    assert asked(monkeypatch, "--set", "focal=150") == ["focal=192", "reconstruction.iterations=3000", "focal=150"]
+    assert asked(monkeypatch, "--set", "focal=150") == ["focal=192", "reconstruction.iterations=2500", "focal=150"]
 
 
 def test_settings_of_ones_own_keep_their_iterations(monkeypatch, tmp_path):
