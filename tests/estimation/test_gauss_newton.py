@@ -60,3 +60,17 @@ def test_where_every_long_step_fits_worse_a_short_one_is_found():
         bounds=(np.full(1, -9.0), np.full(1, 9.0)), share=1.0, iterations=40, workers=1,
     )  # fmt: skip
     assert found.x[0] == pytest.approx(1 / 80, rel=0.1)
+
+
+@pytest.mark.parametrize("workers", [4, 6])
+def test_steps_tried_side_by_side_lead_where_they_lead_in_turn(workers):
+    def course(workers: int) -> list[np.ndarray]:
+        passed: list[np.ndarray] = []
+        gauss_newton(
+            decay, np.array([1.0, 0.3]), prior=np.zeros(2), spread=np.full(2, 1e4), differences=np.full(2, 1e-4),
+            bounds=(np.zeros(2), np.full(2, 9.0)), share=1.0, iterations=60, workers=workers,
+            said=lambda iteration, x, cost: passed.append(x),
+        )  # fmt: skip
+        return passed
+
+    assert np.array_equal(course(workers), course(1))
