@@ -4,12 +4,12 @@ Dense inverse search (Kroeger, Timofte, Dai and Van Gool, Fast optical flow usin
 ECCV 2016) as OpenCV has it.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from threading import Lock
-
 import cv2
 import numpy as np
+
+# The search walks in one stripe per thread, so its result would depend on the number of cores. Once and for all: frames
+# are worked on side by side, and a process may end where the number changes while another thread computes.
+cv2.setNumThreads(1)
 
 
 def dense_flow(a: np.ndarray, b: np.ndarray, *, start: np.ndarray | None = None) -> np.ndarray:
@@ -24,8 +24,7 @@ def dense_flow(a: np.ndarray, b: np.ndarray, *, start: np.ndarray | None = None)
     room = max(int(np.floor(np.log2(max(min(height, width), 16) / 16))), 0)
     search.setFinestScale(min(1, room))
     guess = None if start is None else start.astype(np.float32).copy()
-    with _one_thread():
-        return search.calc(first, second, guess)
+    return search.calc(first, second, guess)
 
 
 def carry(field: np.ndarray, flow: np.ndarray, *, nearest: bool = False) -> np.ndarray:
@@ -63,26 +62,3 @@ def pixel_grid(height: int, width: int) -> np.ndarray:
 
 def _grey(frame: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(frame if frame.ndim == 2 else cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY))
-
-
-class _Threads:
-    """OpenCV's own, which are the same for all that runs beside it."""
-
-    lock, searches, before = Lock(), 0, 1
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    # The search walks in one stripe per thread, so its result would depend on the number of cores.
-    with _Threads.lock:
-        if not _Threads.searches:
-            _Threads.before = cv2.getNumThreads()
-            cv2.setNumThreads(1)
-        _Threads.searches += 1
-    try:
-        yield
-    finally:
-        with _Threads.lock:
-            _Threads.searches -= 1
-            if not _Threads.searches:
-                cv2.setNumThreads(_Threads.before)

@@ -91,11 +91,11 @@ wildcard_constraints:
     variant="|".join(PLAN.variants),
 
 
-# Snakemake passes a job's threads on as OMP_NUM_THREADS only (OpenCV would take all of a machine); and a stage must run
-# with this checkout's library.
+# Snakemake passes a job's threads on as OMP_NUM_THREADS only (OpenCV would take all of a machine, beside frames that are
+# worked on side by side already); and a stage must run with this checkout's library.
 shell.prefix(
-    "set -euo pipefail; export NUMBA_NUM_THREADS=$OMP_NUM_THREADS OPENCV_FOR_THREADS_NUM=$OMP_NUM_THREADS"
-    " MPLBACKEND=Agg PYTHONHASHSEED=0"
+    "set -euo pipefail; export NUMBA_NUM_THREADS=$OMP_NUM_THREADS OPENCV_FOR_THREADS_NUM=1"
+    " MPLBACKEND=Agg PYTHONHASHSEED=0 PYTHONFAULTHANDLER=1"
     f" SURGISIM='{ROOT}' PYTHONPATH='{ROOT}' PATH='{Path(sys.executable).parent}':$PATH; "
 )
 
