@@ -22,6 +22,8 @@ REGION = np.repeat(np.arange(20), COUNT // 20)
 class Linear:
     """A trial whose residuals are straight in its numbers."""
 
+    workers = 2
+
     wanted: Search
     slope: np.ndarray
     off: np.ndarray
