@@ -122,7 +122,7 @@ def test_a_right_view_gives_depth_and_a_baseline_its_scale(baseline, scale):
     assert np.allclose(np.median(result.z), want, rtol=0.01)
 
 
-def test_a_right_view_is_matched_below_the_pixel_and_only_where_it_reaches():
+def test_a_right_view_is_matched_below_the_pixel_and_only_where_it_reaches(monkeypatch):
     rng = np.random.default_rng(2)
     paint = cv2.GaussianBlur(rng.uniform(0, 255, (64, 140, 3)), (0, 0), 1.2)
     paint = 128 + 4 * (paint - 128)
@@ -142,6 +142,13 @@ def test_a_right_view_is_matched_below_the_pixel_and_only_where_it_reaches():
     z, trust, _ = stereo.estimate(np.stack([left] * 2), hidden, given, cam, guide, distance=0.07)
     assert z[0][:, 20:80] == pytest.approx(cam.fx * 0.004 / 7.3, rel=0.02)
     assert trust[:, 10:-10, 1:5].mean() < 0.5 * trust[:, 10:-10, 20:80].mean()
+    # What fits best far from where it was matched is not measured.
+    astray = 1.8 * ((x > 40) & (x < 52))
+    registered = stereo.registered
+    monkeypatch.setattr(stereo, "registered", lambda *views: registered(*views) + astray)
+    z, trust, _ = stereo.estimate(np.stack([left] * 2), hidden, given, cam, guide, distance=0.07)
+    assert z[0][:, 20:80] == pytest.approx(cam.fx * 0.004 / 7.3, rel=0.02)
+    assert trust[:, 10:-10, 44:48].mean() < 0.8 * trust[:, 10:-10, 20:36].mean()
 
 
 def test_noise_is_averaged_along_the_guides_shape_and_neither_its_scale_nor_a_step_it_lacks_is_lost():
