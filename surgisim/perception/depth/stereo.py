@@ -52,14 +52,14 @@ def estimate(
     disparity = np.stack([match(left, right) for left, right in zip(rgb, given.right, strict=True)])
     # What lies left of the right view's edge was matched with nothing.
     known = (disparity > 0.5) & (np.arange(rgb.shape[2]) - disparity >= EDGE) & ~hidden
+    fitted = np.stack([registered(*views) for views in zip(rgb, given.right, disparity, known, strict=True)])
+    known &= (np.abs(fitted - disparity) < STRAYS) & (fitted > 0.5)
     share = known.sum() / max((~hidden).sum(), 1)
     if share < 0.05:
         raise Problem(
             f"depth: only {100 * share:.0f} % of the left view is found in the right one. "
             "Check that the two views are rectified and in order, or set depth.backend to 'near_light'."
         )
-    fitted = np.stack([registered(*views) for views in zip(rgb, given.right, disparity, known, strict=True)])
-    known &= (np.abs(fitted - disparity) < STRAYS) & (fitted > 0.5)
     z, share = guided(guide[0], measured(fitted, given.baseline or 1.0, camera), known)
     confidence = SURE * share + (1 - share) * guide[1]
     if given.baseline > 0 and camera.focal_from == "given":
