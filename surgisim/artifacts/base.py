@@ -21,6 +21,8 @@ from surgisim.artifacts.partial import clear_left, partial
 from surgisim.problem import Problem
 
 HEADER = "__header__"
+QUICKLY = 1
+"""How hard arrays are packed, of 9: measured numbers pack as badly at numpy's 6, which takes nearly twice as long."""
 A = TypeVar("A", bound="Artifact")
 
 
@@ -32,9 +34,13 @@ class Artifact:
 
     def encode(self, header: dict[str, Any]) -> bytes:
         """The file's bytes: one member per field, and the header."""
-        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in dataclasses.fields(self)}
+        arrays = {HEADER: np.array(json.dumps(header, sort_keys=True))}
+        arrays |= {f.name: np.asarray(getattr(self, f.name)) for f in dataclasses.fields(self)}
         stream = io.BytesIO()
-        np.savez_compressed(stream, **{HEADER: np.array(json.dumps(header, sort_keys=True))}, **arrays)
+        with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=QUICKLY) as archive:
+            for name, array in arrays.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                    np.lib.format.write_array(member, array, allow_pickle=False)
         return stream.getvalue()
 
     @classmethod

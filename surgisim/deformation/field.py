@@ -40,6 +40,8 @@ class Field:
     """Weight matrices, each (out, in), without biases."""
     sheets: Sheets | None = None
     """How planes lie beside each other on a GPU."""
+    box: tuple[torch.Tensor, torch.Tensor] | None = None
+    """The box's lower corner and size in space [m], (3,) each, where the planes are."""
 
     def __call__(self, mean: torch.Tensor, time: float) -> tuple[torch.Tensor, ...]:
         """dmu [m] (G, 3), do (G,), dR (G, 4), dS (G, 3) of Gaussians resting at `mean` [m], (G, 3), at `time` [s].
@@ -69,14 +71,16 @@ class Field:
         planes = self.sheets.unpack(self.planes) if self.sheets else self.planes
         head, planes = tuple(weight.to(device) for weight in self.head), planes.to(device)
         if device.type == "cpu":
-            return replace(self, planes=planes, head=head, sheets=None)
-        sheets = Sheets(self.layout, planes)
-        return replace(self, planes=sheets.pack(planes), head=head, sheets=sheets)
+            return replace(self, planes=planes, head=head, sheets=None, box=None)
+        sheets, ends = Sheets(self.layout, planes), (self.low[:3], self.high[:3] - self.low[:3])
+        # Brought there once: bringing numbers to a GPU waits for all that it still does.
+        box = tuple(planes.new_tensor(a) for a in ends)
+        return replace(self, planes=sheets.pack(planes), head=head, sheets=sheets, box=box)
 
     def inside(self, mean: torch.Tensor) -> torch.Tensor:
         """Positions in the box, 0-1."""
-        low, high = (mean.new_tensor(a[:3]) for a in (self.low, self.high))
-        return (mean - low) / (high - low)
+        low, size = self.box or (mean.new_tensor(a[:3]) for a in (self.low, self.high - self.low))
+        return (mean - low) / size
 
     def clock(self, time: float) -> float:
         """Time in the box, 0-1."""

@@ -51,20 +51,24 @@ def handed_on(trial: Trial, values: Values, theta: np.ndarray, history: list) ->
     Where tissue is all but inside out, rounding decides whether a replay of it breaks, on this machine or on the next.
     Raises Problem when even without any patch of the edge the softest grip squeezes it too far.
     """
-    body = trial.bodies[0]
-    particles = Carried(body.body.rest, body.simulator)
     while True:
         try:
-            run = body.simulator.run(theta, trial.drive(values, stiffest=body.stiffest(theta)))
-            volume = np.min([np.linalg.det(particles.at(u)[1]) for u in run.u], axis=0)
-            if volume.min() >= SQUEEZED:
-                return trial, run
-            broke, particle = f"tissue is squeezed to {volume.min():.3f} of its volume", int(volume.argmin())
+            return trial, with_margin(trial, values, theta)
         except Breakdown as breakdown:
-            broke, particle = str(breakdown), breakdown.particle
-        history.append({"round": "grip", "share": trial.grip, "cost": None, "broke": broke})
-        place = None if particle is None else body.body.rest[particle]
-        trial = _gives_way(trial, place, YIELDS * trial.grip if trial.grip >= GRIPS[-1] else None)
+            history.append({"round": "grip", "share": trial.grip, "cost": None, "broke": str(breakdown)})
+            place = None if breakdown.particle is None else trial.bodies[0].body.rest[breakdown.particle]
+            trial = _gives_way(trial, place, YIELDS * trial.grip if trial.grip >= GRIPS[-1] else None)
+
+
+def with_margin(trial: Trial, values: Values, theta: np.ndarray) -> Run:
+    """The whole clip of a settled trial, see `handed_on`; raises Breakdown where its body does not bear it."""
+    body = trial.bodies[0]
+    run = body.simulator.run(theta, trial.drive(values, stiffest=body.stiffest(theta)))
+    particles = Carried(body.body.rest, body.simulator)
+    volume = np.min([np.linalg.det(particles.at(u)[1]) for u in run.u], axis=0)
+    if volume.min() < SQUEEZED:
+        raise Breakdown(f"tissue is squeezed to {volume.min():.3f} of its volume", particle=int(volume.argmin()))
+    return run
 
 
 def _gives_way(trial: Trial, place: np.ndarray | None, grip: float | None) -> Trial:

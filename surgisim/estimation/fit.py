@@ -20,7 +20,7 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
-from surgisim.estimation.bearing import borne, handed_on
+from surgisim.estimation.bearing import borne, handed_on, with_margin
 from surgisim.estimation.carrying import OPENS, carrying, course
 from surgisim.estimation.damping import numerical_damping
 from surgisim.estimation.doubts import doubts, none, spreads
@@ -65,7 +65,7 @@ from surgisim.estimation.trial import SAFETY, WORKERS, Trial, workers
 from surgisim.estimation.written import physics_of, unfitted
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
-from surgisim.mpm.simulator import Run
+from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.physics.catalogue import choose, columns
 from surgisim.physics.place import Place
 from surgisim.problem import Problem
@@ -183,46 +183,50 @@ def estimate(
             ask = partial(otherwise, camera=camera, points=carried, make=make)
             trial, solution, model, open_beside = _weighed(trial, solution, ask, ends[-1:], settings, history, progress)
         table = _known(trial, solution, model, phase, settings)
-        wide, wide_x = trial, solution.x
+        wide, wider = trial, solution
         if trial.laying and any(q["told"] for q in table.values()):
             fine, finest = finely(trial, solution, history, _part(progress, 0.7, 0.8))
-            shift = finest.x - wide_x
+            shift = finest.x - wider.x
+            model = model | {"grid": np.outer(shift, shift)}
             # What nothing tells the pace of has no waves that ask for it: it tells how far a grid is off, and no more.
             if trial.eased is None:
                 trial, solution = fine, finest
-            table = _known(trial, solution, model | {"grid": np.outer(shift, shift)}, phase, settings)
+            table = _known(trial, solution, model, phase, settings)
         finer = trial is not wide
         # What fits may yet turn the tissue inside out in the frames after those that were compared.
-        wide, _ = borne(wide, wide_x, history)
-        unsure = doubts(wide, wide_x, spreads(wide.wanted, table), open_beside, tracks, camera)
-        x = solution.x
+        wide, _ = borne(wide, wider.x, history)
+        unsure = doubts(wide, wider.x, spreads(wide.wanted, table), open_beside, tracks, camera)
+        x, wide_x = solution.x, wider.x
     else:
         wide, wide_x, finer = trial, x, False
         unsure = none(tracks)
     edge = (trial.laying.margin, trial.laying.rim) if trial.laying else (0.0, bool(body.held[body.surface].any()))
     loose = trial.laying.loose if trial.laying else 0.0
-    depth = trial.depth(x)
 
     def alone(trial: Trial) -> Trial:
         """With one body, of which every thread simulates a share."""
         return replace(trial, bodies=[make(trial.bodies[0].body, trial.motion, threads=WORKERS)])
 
     coarse, uniform = alone(wide.settled(wide_x)), wide.values(wide_x)
+    field, refined = coarse.theta(uniform), None
     if settings.enabled:
-        coarse, _ = handed_on(coarse, uniform, coarse.theta(uniform), history)
-    values = trial.wanted.values(x)
-    trial = alone(trial.settled(x)) if finer else coarse
-    if finer:
-        edge_kept = {"rim": coarse.motion.rim, "rim_radius": coarse.motion.rim_radius}
-        trial = replace(trial, grip=coarse.grip, motion=replace(trial.motion, **edge_kept))
-    theta, refined = trial.theta(values), None
-    if settings.enabled:
+        coarse, _ = handed_on(coarse, uniform, field, history)
         # A field shapes what is slow, which the wider grid shows as well, at a fifth of the cost.
         field, refined = _refined(coarse, uniform, wide.eased or 0.0, scene, frames, masks, camera, settings, progress)
-        theta = _brought(field, coarse, uniform, trial, values)
-    # What nothing tells the pace of takes the same shapes in longer steps.
-    there = trial.wanted.values(trial.wanted.paced(x, wide.eased or 0.0))
-    trial, run = handed_on(trial, there, _brought(theta, trial, values, trial, there), history)
+    on_finer = None
+    if finer:
+        on_finer = _on_finer(alone(trial.settled(x)), trial.wanted.values(x), coarse, uniform, field, history)
+        if on_finer is None:
+            trial, x = wide, wide_x
+            table = _known(trial, wider, model, phase, settings)
+    depth, values = trial.depth(x), trial.wanted.values(x)
+    if on_finer:
+        trial, theta, run = on_finer
+    else:
+        trial, theta = coarse, _brought(field, coarse, uniform, coarse, values)
+        # What nothing tells the pace of takes the same shapes in longer steps.
+        there = trial.wanted.values(trial.wanted.paced(x, wide.eased or 0.0))
+        trial, run = handed_on(trial, there, _brought(theta, trial, values, trial, there), history)
     prepared, laid = trial.bodies[0], trial.bodies[0].body
     support = Support(depth, *edge, len(trial.motion.rim), loose, bool(len(laid.torn)))
     path = trial.drive(values, stiffest=prepared.stiffest(theta))
@@ -369,6 +373,23 @@ def _brought(field: np.ndarray, coarse: Trial, uniform: Values, trial: Trial, va
     ratio = np.where(even != 0, field / np.where(even != 0, even, 1.0), 1.0)
     near = cKDTree(coarse.bodies[0].body.rest).query(trial.bodies[0].body.rest)[1]
     return trial.theta(values) * ratio[near]
+
+
+def _on_finer(
+    fine: Trial, values: Values, coarse: Trial, uniform: Values, field: np.ndarray, history: list
+) -> tuple[Trial, np.ndarray, Run] | None:
+    """A settled trial on a finer grid, held as the coarse one is, with that one's field, (P, M), and the run of it.
+
+    None, with a line in `history`, where it does not bear that: held softer it would follow the grip less.
+    """
+    edge_kept = {"rim": coarse.motion.rim, "rim_radius": coarse.motion.rim_radius}
+    fine = replace(fine, grip=coarse.grip, motion=replace(fine.motion, **edge_kept))
+    theta = _brought(field, coarse, uniform, fine, values)
+    try:
+        return fine, theta, with_margin(fine, values, theta)
+    except Breakdown as breakdown:
+        history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
+        return None
 
 
 def _part(progress: Say, begin: float, end: float) -> Say:

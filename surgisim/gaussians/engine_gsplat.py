@@ -7,6 +7,7 @@ Gaussian that would bring T below 1e-4 is left out. It builds its kernels with n
 
 import importlib.util
 import shutil
+from functools import lru_cache
 
 import numpy as np
 import torch
@@ -59,12 +60,10 @@ def draw_covariances(
     the CUDA device."""
     from gsplat import rasterization
 
-    lens = mean.new_tensor(camera.matrix)
-    lens[:2, 2] += 0.5
     with torch.no_grad():
         image, alpha, _ = rasterization(
-            mean, None, None, opacity, color, torch.eye(4, device=mean.device)[None], lens[None], camera.width,
-            camera.height, near_plane=near, eps2d=LOW_PASS, packed=False, covars=covariance,
+            mean, None, None, opacity, color, *_views(camera, mean.device), camera.width, camera.height,
+            near_plane=near, eps2d=LOW_PASS, packed=False, covars=covariance,
         )  # fmt: skip
     return image[0], alpha[0, ..., 0]
 
@@ -99,25 +98,39 @@ def lacking() -> str:
 def _draw(mean, rotation, scale, opacity, color, camera, background, near, mode):
     from gsplat import rasterization
 
-    lens = mean.new_tensor(camera.matrix)
-    lens[:2, 2] += 0.5
     image, alpha, facts = rasterization(
         mean,
         rotation,
         scale,
         opacity,
         color,
-        torch.eye(4, device=mean.device)[None],
-        lens[None],
+        *_views(camera, mean.device),
         camera.width,
         camera.height,
         near_plane=near,
         eps2d=LOW_PASS,
         packed=False,
-        backgrounds=mean.new_tensor(background)[None],
+        backgrounds=_constant((background,), mean.device),
         render_mode=mode,
     )
     return image[0], alpha[0, ..., 0], facts
+
+
+def _views(camera: Camera, device: torch.device) -> tuple[torch.Tensor, torch.Tensor]:
+    """The camera's pose and lens as gsplat wants them, (1, 4, 4) and (1, 3, 3): pixel centres lie at halves there."""
+    lens = camera.matrix
+    lens[:2, 2] += 0.5
+    return _constant((_rows(np.eye(4)),), device), _constant((_rows(lens),), device)
+
+
+def _rows(matrix: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    return tuple(map(tuple, matrix.tolist()))
+
+
+@lru_cache(maxsize=64)
+def _constant(numbers: tuple, device: torch.device) -> torch.Tensor:
+    """These numbers on the device, brought there once: bringing any there waits for all that the device still does."""
+    return torch.tensor(numbers, dtype=torch.float32, device=device)
 
 
 def _weight(mean, rotation, scale, opacity, camera, near):

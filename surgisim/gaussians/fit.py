@@ -29,6 +29,9 @@ WIDEST = 10.0
 TRAJECTORY_EVERY = 2
 """Iterations from one to the next that counts the trajectory term, as many times over: it costs as much as the whole
 field once more."""
+WEIGHED_EVERY = 2
+"""Iterations from one to the next that tells a GPU's engine what each Gaussian adds to the picture, for which it draws
+that once more."""
 REPORTS = 100
 """Rows of the history."""
 
@@ -59,7 +62,8 @@ class Fit:
         """All iterations; returns the history, (R, 5)."""
         total = self.settings.iterations
         renewals = {round(share * total) for share in RENEWALS}
-        order, history, loss_sum, error_sum = [], [], [], []
+        every = max(total // REPORTS, 1)
+        order, history, rows, steps = [], [], [], []
         for i in range(total):
             phase = phase_at(i, total, self.settings.phases)
             if not order:
@@ -68,19 +72,36 @@ class Fit:
                 self.renew()
             # Frame 0 is the rest scene: seen no oftener than others, the scene would settle where it is on average.
             anchor = self.settings.rest_every and i % self.settings.rest_every == 0
-            loss, error = self.step(phase, 0 if anchor else order.pop(), i)
-            loss_sum.append(loss)
-            error_sum.append(error)
-            if len(loss_sum) >= max(total // REPORTS, 1) or i == total - 1:
-                psnr = -10 * np.log10(max(np.mean(error_sum), 1e-12))
+            u = 0 if anchor else order.pop()
+            steps.append((i, u, self.step(phase, u, i)))
+            reports = (i + 1) % every == 0 or i == total - 1
+            # A GPU that is asked after every step waits for each.
+            if reports or self.device.type == "cpu":
+                rows += self.finite(steps)
+                steps = []
+            if reports:
+                loss, error = np.mean(rows, 0)
+                psnr = -10 * np.log10(max(error, 1e-12))
                 count = len(self.adam.tensors["mean"])
-                history.append((i + 1, np.mean(loss_sum), psnr, count, phase.number))
+                history.append((i + 1, loss, psnr, count, phase.number))
                 progress(i + 1, total, f"{phase.name}: {psnr:.1f} dB, {count} Gaussians")
-                loss_sum, error_sum = [], []
+                rows = []
         return np.array(history, np.float32)
 
-    def step(self, phase: Phase, u: int, iteration: int) -> tuple[float, float]:
-        """One frame's loss, its gradients, one step; returns the loss and the mean squared error on seen tissue."""
+    def finite(self, steps: list[tuple[int, int, torch.Tensor]]) -> list[list[float]]:
+        """What `step` gave at each iteration for each of the seen frames, as numbers; raises Problem for the first that
+        is none."""
+        values = torch.stack([value for *_, value in steps]).tolist()
+        for (iteration, u, _), (loss, _) in zip(steps, values, strict=True):
+            if not np.isfinite(loss):
+                raise Problem(
+                    f"reconstruction: the loss is not finite at iteration {iteration}, frame {self.seen.frame[u]}. "
+                    "Lower the step sizes (rate_mean, rate_planes, rate_head)."
+                )
+        return values
+
+    def step(self, phase: Phase, u: int, iteration: int) -> torch.Tensor:
+        """One frame's loss, its gradients, one step; the loss and the mean squared error on seen tissue, (2,)."""
         adam = self.adam
         canonical = ATTRIBUTES if phase.moves_canonical else ()
         adam.watch((*canonical, "planes", *self.head) if phase.moves_field else canonical)
@@ -90,6 +111,7 @@ class Fit:
         moved, opacity, turn, grow = field(mean, time)
         radius = (adam.tensors["scale"] + grow).exp()
         recorded = iteration < RENEWALS[-1] * self.settings.iterations
+        on_cpu = self.device.type == "cpu"
         probe = torch.zeros(len(mean), 2, device=self.device, requires_grad=recorded)
         image = rasterise(
             mean + moved,
@@ -100,14 +122,10 @@ class Fit:
             self.camera,
             engine=engine_on(self.device),
             probe=probe,
-            weigh=recorded,
+            weigh=recorded and (on_cpu or iteration % WEIGHED_EVERY == 0),
+            checked=on_cpu,
         )
         loss = self.misfit(phase, image, u) + self.priors(phase, field, radius, moved, time, iteration)
-        if not torch.isfinite(loss):
-            raise Problem(
-                f"reconstruction: the loss is not finite at iteration {iteration}, frame {self.seen.frame[u]}. "
-                "Lower the step sizes (rate_mean, rate_planes, rate_head)."
-            )
         loss.backward()
         if phase.moves_field and time == 0:
             # The rest scene says nothing of the head: its slope is zero, and its moments decay as ever.
@@ -119,7 +137,7 @@ class Fit:
         whole = self.seen.weight[u] == 1
         wrong = (image.rgb.detach() - self.seen.rgb[u]).square().mean(-1)
         error = (wrong * whole).sum() / whole.sum().clamp(min=1)
-        return tuple(torch.stack([loss.detach(), error]).tolist())
+        return torch.stack([loss.detach(), error])
 
     def misfit(self, phase: Phase, image: Image, u: int) -> torch.Tensor:
         """Colour and depth of one frame against what was seen."""

@@ -48,6 +48,7 @@ def rasterise(
     probe: torch.Tensor | None = None,
     near: float = NEAR,
     weigh: bool = True,
+    checked: bool = True,
 ) -> Image:
     """The image of the Gaussians, with gradients for their five attributes from rgb, depth and alpha.
 
@@ -60,12 +61,13 @@ def rasterise(
     probe       zeros (G, 2) that want a gradient; after backward they hold that of the projected centres [1/px]
     near        what is closer along z is not drawn [m]
     weigh       whether `weight` is asked for: gsplat draws once more for it, and leaves it 0 where it is not
+    checked     whether values are looked at first, which waits for all that a GPU still does
 
     Raises Problem for shapes that do not fit, values that are not finite, opacities outside 0-1, and a missing
     CUDA engine.
     """
     attributes = {"mean": mean, "rotation": rotation, "scale": scale, "opacity": opacity, "color": color}
-    _check(attributes)
+    _check(attributes, checked)
     back = (0.0, 0.0, 0.0) if background is None else tuple(float(b) for b in background)
     if probe is None:
         probe = mean.new_zeros((len(mean), 2))
@@ -132,13 +134,13 @@ def to_bytes(rgb: np.ndarray) -> np.ndarray:
     return np.rint(np.clip(rgb, 0, 1) * 255).astype(np.uint8)
 
 
-def _check(attributes: dict[str, torch.Tensor]) -> None:
+def _check(attributes: dict[str, torch.Tensor], values: bool) -> None:
     g = len(attributes["mean"])
     wanted = {"mean": (g, 3), "rotation": (g, 4), "scale": (g, 3), "opacity": (g,), "color": (g, 3)}
     for name, tensor in attributes.items():
         if tuple(tensor.shape) != wanted[name]:
             raise Problem(f"rasterise: {name} has shape {tuple(tensor.shape)}, and {wanted[name]} is wanted.")
-    if not g:
+    if not (g and values):
         return
     given = {name: tensor.detach() for name, tensor in attributes.items()}
     # A sum is not finite as soon as one value is not, and costs a fifth of testing each; all are asked for at once,

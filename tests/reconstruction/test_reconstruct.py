@@ -136,8 +136,14 @@ def test_the_rest_scene_says_nothing_of_the_field(clip, fit):
 
 def test_a_number_that_is_not_finite_stops_the_fit_and_names_the_frame(fit):
     fit.seen.rgb[3, 0, 0] = torch.nan
-    with pytest.raises(Problem, match="iteration 0, frame 4"):
-        fit.step(PHASES[0], 3, 0)
+    with pytest.raises(Problem, match="iteration 7, frame 4"):
+        fit.finite([(6, 2, fit.step(PHASES[0], 2, 6)), (7, 3, fit.step(PHASES[0], 3, 7))])
+
+
+def test_a_fit_is_stopped_by_it(fit):
+    fit.seen.rgb[3, 0, 0] = torch.nan
+    with pytest.raises(Problem, match="frame 4"):
+        fit.run(lambda *_: None)
 
 
 def test_inputs_of_two_clips_are_refused(clip):

@@ -106,8 +106,8 @@ def _by_colour(bins: np.ndarray, found: np.ndarray, inside: np.ndarray) -> np.nd
     for chosen in (found, inside & ~found):
         table = np.bincount(bins[chosen], minlength=BINS**3).reshape(BINS, BINS, BINS).astype(np.float64)
         tables.append(gaussian_filter(table, 1.0).ravel() / max(chosen.sum(), 1))
-    ratio = np.log((tables[0] + 2e-6) / (tables[1] + 2e-6))
-    return np.clip(ratio, -4, 4)[bins].astype(np.float32)
+    ratio = np.clip(np.log((tables[0] + 2e-6) / (tables[1] + 2e-6)), -4, 4).astype(np.float32)
+    return np.stack(list(in_order(ratio.take, zip(bins))))
 
 
 def _motion(rgb: np.ndarray, progress) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -125,12 +125,17 @@ def _motion(rgb: np.ndarray, progress) -> list[tuple[np.ndarray, np.ndarray]]:
 
 def _shared_in_time(evidence: np.ndarray, motion: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """Evidence averaged with that of the neighbouring frames where the flow can be trusted, (T, H, W)."""
+
+    def told(of: np.ndarray, way: np.ndarray, back: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        trusted = 0.3 * agrees(way, back)
+        return trusted * carry(of, way), trusted
+
+    asked = [ask for t, (on, back) in enumerate(motion) for ask in ((t, t + 1, on, back), (t + 1, t, back, on))]
     summed, weight = evidence.copy(), np.ones_like(evidence)
-    for t, (there, back) in enumerate(motion):
-        for a, b, way, other in ((t, t + 1, there, back), (t + 1, t, back, there)):
-            trusted = 0.3 * agrees(way, other)
-            summed[a] += trusted * carry(evidence[b], way)
-            weight[a] += trusted
+    answers = in_order(told, ((evidence[b], way, back) for _, b, way, back in asked))
+    for (a, *_), (more, trusted) in zip(asked, answers, strict=True):
+        summed[a] += more
+        weight[a] += trusted
     return summed / weight
 
 

@@ -13,7 +13,7 @@ def settled(frame: np.ndarray, evidence: np.ndarray) -> np.ndarray:
     Mean field of a contrast-sensitive Potts model: Boykov and Jolly, Interactive graph cuts, ICCV 2001, for
     the model; a graph cut would be exact, but knows no degrees.
     """
-    links = _links(frame.astype(np.float32))
+    links = _links(frame)
     current = evidence
     for _ in range(ROUNDS):
         current = evidence + STRENGTH * _heard(np.tanh(current / 2), links)
@@ -34,10 +34,23 @@ def _heard(belief, links):
     return out
 
 
-def _links(frame: np.ndarray) -> np.ndarray:
+@njit(cache=True, nogil=True)
+def _links(frame):
     """How much each pixel listens to its neighbour to the right, below, and on both diagonals below, (4, H, W); nothing
     beyond the picture."""
-    contrast = [((frame - np.roll(frame, (-d, -r), (0, 1))) ** 2).sum(-1) for d, r in STEPS]
-    typical = 2 * contrast[0][:, :-1].mean() + 1e-6
-    away = np.array([np.hypot(*step) for step in STEPS], np.float32)
-    return np.exp(-np.stack(contrast) / typical) / away[:, None, None]
+    height, width, channels = frame.shape
+    contrast = np.full((len(STEPS), height, width), np.inf, np.float32)
+    for k in range(len(STEPS)):
+        down, right = STEPS[k]
+        for i in range(height - down):
+            for j in range(max(0, -right), width - max(0, right)):
+                squares = np.float32(0.0)
+                for c in range(channels):
+                    apart = np.float32(frame[i, j, c]) - np.float32(frame[i + down, j + right, c])
+                    squares += apart * apart
+                contrast[k, i, j] = squares
+    typical = np.float32(2 * contrast[0, :, : width - 1].mean() + 1e-6)
+    for k in range(len(STEPS)):
+        away = np.float32(np.sqrt(STEPS[k][0] ** 2 + STEPS[k][1] ** 2))
+        contrast[k] = np.exp(-contrast[k] / typical) / away
+    return contrast
