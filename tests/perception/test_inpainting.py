@@ -157,3 +157,13 @@ def test_an_instrument_that_covers_everything_is_refused():
     rgb, tool, _ = passing(4)
     with pytest.raises(Problem, match="covers every frame"):
         filled(rgb, tool | True)
+
+
+def test_a_hole_of_any_number_of_pixels_is_filled():
+    """OpenCV reads at most 32,767 places in a row; a wide instrument in a frame of 640 x 512 hides more."""
+    rgb = np.repeat(tissue(3, (260, 300))[None], 3, 0)
+    tool = np.zeros(rgb.shape[:3], bool)
+    tool[1, 20:240, 20:280] = True
+    result = filled(rgb, tool)
+    assert (result.origin[tool] == COPIED).all()
+    assert np.abs(result.rgb.astype(int) - rgb).max() < 45

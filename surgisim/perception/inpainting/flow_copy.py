@@ -17,6 +17,7 @@ from surgisim.config.inpainting import Inpainting
 from surgisim.perception.flow import dense_flow
 from surgisim.perception.inpainting.smooth import continued
 from surgisim.perception.inpainting.source import Source, behind, followed, seen
+from surgisim.perception.tracking.between import sample
 from surgisim.side_by_side import in_order
 
 Invent = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -147,9 +148,7 @@ def _looked_up(rgb: np.ndarray, source: Source, chosen: np.ndarray) -> np.ndarra
     frame, xy = source.frame[chosen], source.xy[chosen]
     for s in np.unique(frame):
         mine = frame == s
-        at = xy[mine]
-        sampled = cv2.remap(rgb[s].astype(np.float32), at[None, :, 0], at[None, :, 1], cv2.INTER_LINEAR)
-        colours[mine] = sampled[0]
+        colours[mine] = sample(rgb[s], xy[mine])
     return colours
 
 
