@@ -10,7 +10,7 @@ from surgisim.config.base import Settings
 class Reconstruction(Settings):
     iterations: int = Field(5000, ge=10)
     """Optimisation steps, one frame each [1]."""
-    phases: tuple[float, float, float] = (0.5, 0.7, 0.9)
+    phases: tuple[float, float, float] = (0.2, 0.5, 0.9)
     """Ends of the coarse phase, of the trajectory phase and of the field's refinement; from the last on the field is
     frozen and the canonical scene refined [fraction of iterations]."""
     seed: int = 0
@@ -61,6 +61,10 @@ class Reconstruction(Settings):
     """Sides of the blocks [longest image side]."""
     depth: float = Field(0.5, ge=0)
     """Weight of the depth misfit [1/median depth]."""
+    tint: float = Field(0.01, ge=0)
+    """Weight of how far colours change in time: what motion explains is left to it [1]."""
+    knots_of_tint: float = Field(0.3, gt=0)
+    """Moments at which they may have changed [1/frame]."""
     smoothness_space: float = Field(0.002, ge=0)
     """Weight of the planes' squared differences in space [1]."""
     smoothness_time: float = Field(0.005, ge=0)
@@ -70,13 +74,15 @@ class Reconstruction(Settings):
     """Weight of a pixel whose colour was copied from another frame; seen tissue weighs 1 [1]."""
     weight_invented: float = Field(0.03, ge=0, le=1)
     """Weight of a pixel whose colour was invented [1]."""
-    weight_specular: float = Field(0.3, ge=0, le=1)
+    weight_specular: float = Field(1.0, ge=0, le=1)
     """Weight of a highlight [1]."""
 
     rate_mean: float = Field(2e-4, gt=0)
     """Step size of the centres [half longest side of the box]."""
     rate_color: float = Field(2e-3, gt=0)
     """Step size of the colours [1]."""
+    rate_tint: float = Field(3e-2, gt=0)
+    """Step size of how far colours change in time [1]."""
     rate_opacity: float = Field(2e-2, gt=0)
     """Step size of the opacities' logits [1]."""
     rate_scale: float = Field(5e-3, gt=0)

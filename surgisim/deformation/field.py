@@ -108,8 +108,9 @@ def still_field(
     return Field(layout, np.asarray(low, float), np.asarray(high, float), torch.ones(layout.count), head)
 
 
-def save_field(field: Field, history: np.ndarray) -> Deformation:
-    """The field as an artifact; history: one row a report (R, 5)."""
+def save_field(field: Field, tint: np.ndarray, history: np.ndarray) -> Deformation:
+    """The field as an artifact; tint: what is added to the colours at each knot (K, G, 3); history: one row a report
+    (R, 5)."""
     layout = {
         "planes": ["xy", "xz", "yz", "tx", "ty", "tz"],
         "sizes": field.layout.sizes.tolist(),
@@ -122,6 +123,7 @@ def save_field(field: Field, history: np.ndarray) -> Deformation:
         layout=json.dumps(layout, sort_keys=True),
         low=field.low.astype(np.float32),
         high=field.high.astype(np.float32),
+        tint=tint.astype(np.float16),
         history=np.asarray(history, np.float32).reshape(-1, 5),
     )
 

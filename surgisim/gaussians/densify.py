@@ -4,6 +4,7 @@ Kerbl, Kopanas, Leimkuehler and Drettakis, 3D Gaussian splatting, 2023, section 
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -38,10 +39,11 @@ class Record:
         self.images += 1
 
 
-def renew(adam: Adam, record: Record, most: int, share: float, widest: float) -> int:
+def renew(adam: Adam, record: Record, most: int, share: float, widest: float, beside: Sequence[str] = ()) -> int:
     """Drop and split in place; returns the new count.
 
-    most: bound on the count; share: largest share of the Gaussians to split; widest: largest radius kept [m].
+    most: bound on the count; share: largest share of the Gaussians to split; widest: largest radius kept [m]; beside:
+    what has a row for each Gaussian beside its attributes.
     """
     opacity = torch.sigmoid(adam.tensors["opacity"].detach())
     radius = adam.tensors["scale"].detach().amax(1).exp()
@@ -53,7 +55,7 @@ def renew(adam: Adam, record: Record, most: int, share: float, widest: float) ->
     split[worst] = True
     twice = torch.cat([rows, rows[split]])
     fresh = torch.cat([split, torch.ones(int(split.sum()), dtype=torch.bool, device=rows.device)])
-    adam.choose_rows(ATTRIBUTES, twice, fresh)
+    adam.choose_rows((*ATTRIBUTES, *beside), twice, fresh)
     _part(adam, fresh, len(rows))
     return len(twice)
 

@@ -18,10 +18,11 @@ from surgisim.gaussians.neighbours import groups
 from surgisim.gaussians.observations import Observations
 from surgisim.gaussians.rasterise import Image, engine_on, rasterise
 from surgisim.gaussians.schedule import Phase, phase_at, rate_at
+from surgisim.gaussians.tint import knots, tint
 from surgisim.problem import Problem
 
 RENEWALS = (0.1, 0.2, 0.3, 0.4)
-"""When Gaussians are dropped and split, all in the coarse phase [fraction of iterations]."""
+"""When Gaussians are dropped and split [fraction of iterations]."""
 SPLIT = 0.1
 """Largest share of the Gaussians split at once."""
 WIDEST = 10.0
@@ -51,9 +52,11 @@ class Fit:
         self.middle = float(np.median(start.mean[:, 2]))
         self.head = [f"head_{i}" for i in range(len(self.field.head))]
         tensors = {name: torch.from_numpy(getattr(start, name)).to(self.device) for name in ATTRIBUTES}
+        self.tint = [f"tint_{k}" for k in range(knots(settings.knots_of_tint, length))]
         tensors |= {"planes": self.field.planes} | dict(zip(self.head, self.field.head, strict=True))
+        tensors |= {name: torch.zeros_like(tensors["color"]) for name in self.tint}
         rates = {name: getattr(settings, f"rate_{name}") for name in (*ATTRIBUTES, "planes")}
-        rates |= dict.fromkeys(self.head, settings.rate_head)
+        rates |= dict.fromkeys(self.head, settings.rate_head) | dict.fromkeys(self.tint, settings.rate_tint)
         self.adam = Adam(tensors, rates | {"mean": settings.rate_mean * self.field.reach})
         self.groups: torch.Tensor | None = None
         self.record = Record.empty(len(start.mean), self.device)
@@ -104,11 +107,13 @@ class Fit:
         """One frame's loss, its gradients, one step; the loss and the mean squared error on seen tissue, (2,)."""
         adam = self.adam
         canonical = ATTRIBUTES if phase.moves_canonical else ()
-        adam.watch((*canonical, "planes", *self.head) if phase.moves_field else canonical)
+        shown = self.tint if phase.recolours else ()
+        adam.watch((*canonical, *shown, "planes", *self.head) if phase.moves_field else (*canonical, *shown))
         time = self.seen.frame[u] / self.camera.fps
         field = self.current_field()
         mean = adam.tensors["mean"]
         moved, opacity, turn, grow = field(mean, time)
+        added = tint([adam.tensors[name] for name in shown], field.clock(time)) if shown else 0.0
         radius = (adam.tensors["scale"] + grow).exp()
         recorded = iteration < RENEWALS[-1] * self.settings.iterations
         on_cpu = self.device.type == "cpu"
@@ -118,7 +123,7 @@ class Fit:
             adam.tensors["rotation"] + turn,
             radius,
             torch.sigmoid(adam.tensors["opacity"] + opacity),
-            adam.tensors["color"],
+            adam.tensors["color"] + added,
             self.camera,
             engine=engine_on(self.device),
             probe=probe,
@@ -126,6 +131,8 @@ class Fit:
             checked=on_cpu,
         )
         loss = self.misfit(phase, image, u) + self.priors(phase, field, radius, moved, time, iteration)
+        if self.settings.tint and torch.is_tensor(added):
+            loss = loss + self.settings.tint * added.abs().mean()
         loss.backward()
         if phase.moves_field and time == 0:
             # The rest scene says nothing of the head: its slope is zero, and its moments decay as ever.
@@ -178,7 +185,7 @@ class Fit:
 
     def renew(self) -> None:
         """Drop and split Gaussians."""
-        renew(self.adam, self.record, self.most, SPLIT, WIDEST * self.radius)
+        renew(self.adam, self.record, self.most, SPLIT, WIDEST * self.radius, beside=self.tint)
         self.record = Record.empty(len(self.adam.tensors["mean"]), self.device)
         self.groups = None
 
@@ -187,12 +194,13 @@ class Fit:
         head = tuple(self.adam.tensors[name] for name in self.head)
         return replace(self.field, planes=self.adam.tensors["planes"], head=head)
 
-    def result(self) -> tuple[Scene, Field]:
-        """The canonical scene and the field, on the CPU."""
+    def result(self) -> tuple[Scene, Field, np.ndarray]:
+        """The canonical scene, the field, and what is added to the colours at each knot, (K, G, 3), on the CPU."""
         self.adam.watch(())
         arrays = {name: self.adam.tensors[name].cpu().numpy().copy() for name in ATTRIBUTES}
         arrays["rotation"] /= np.linalg.norm(arrays["rotation"], axis=1, keepdims=True)
-        return Scene(**arrays), self.current_field().on(torch.device("cpu"))
+        at_knots = np.stack([self.adam.tensors[name].cpu().numpy() for name in self.tint])
+        return Scene(**arrays), self.current_field().on(torch.device("cpu")), at_knots
 
 
 def first_field(

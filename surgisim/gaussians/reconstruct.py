@@ -5,7 +5,7 @@ Wang, Yang, Zhao, Yang and Shen, Realistic surgical simulation from monocular vi
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
@@ -26,6 +26,7 @@ from surgisim.gaussians.fit import Fit, Say
 from surgisim.gaussians.initialise import initialise
 from surgisim.gaussians.observations import observe
 from surgisim.gaussians.rasterise import render, to_bytes
+from surgisim.gaussians.tint import tinted
 from surgisim.problem import Problem
 
 
@@ -72,9 +73,9 @@ def reconstruct(
     with threads(settings.threads):
         fit = Fit(start, seen, camera, len(frames.rgb), settings)
         history = fit.run(progress)
-        scene, field = fit.result()
-        rgb = np.stack([picture(scene, field, camera, t, settings.device) for t in range(len(frames.rgb))])
-    return Reconstructed(scene, save_field(field, history), Frames(rgb, frames.split))
+        scene, field, tint = fit.result()
+        rgb = np.stack([picture(scene, field, tint, camera, t, settings.device) for t in range(len(frames.rgb))])
+    return Reconstructed(scene, save_field(field, tint, history), Frames(rgb, frames.split))
 
 
 @contextmanager
@@ -90,6 +91,11 @@ def threads(count: int) -> Iterator[None]:
         numba.set_num_threads(before[1])
 
 
-def picture(scene: Scene, field: Field, camera: Camera, frame: int, device: str = "cpu") -> np.ndarray:
-    """A frame of the clip, re-rendered, sRGB 0-255, (H, W, 3) uint8."""
-    return to_bytes(render(*drawn(deform(scene, field, frame / camera.fps)), camera, device=device).rgb)
+def picture(
+    scene: Scene, field: Field, tint: np.ndarray, camera: Camera, frame: int, device: str = "cpu"
+) -> np.ndarray:
+    """A frame of the clip, re-rendered, sRGB 0-255, (H, W, 3) uint8; tint: of the colours at each knot, (K, G, 3)."""
+    time = frame / camera.fps
+    moved = deform(scene, field, time)
+    moved = replace(moved, color=tinted(scene.color, tint, field.clock(time)))
+    return to_bytes(render(*drawn(moved), camera, device=device).rgb)

@@ -19,13 +19,15 @@ class Phase:
     moves_field: bool
     trajectory: bool
     """Whether the trajectory term is part of the loss."""
+    recolours: bool
+    """Whether colours may change in time."""
 
 
 PHASES = (
-    Phase(1, "coarse", True, True, False),
-    Phase(2, "trajectory", True, True, True),
-    Phase(3, "refine", False, True, True),
-    Phase(4, "canonical", True, False, False),
+    Phase(1, "coarse", True, True, False, False),
+    Phase(2, "trajectory", True, True, True, True),
+    Phase(3, "refine", False, True, True, True),
+    Phase(4, "canonical", True, False, False, True),
 )
 
 

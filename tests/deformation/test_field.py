@@ -61,12 +61,12 @@ def test_points_move_with_the_gaussians_at_their_place(moving, scene):
 
 
 def test_a_stored_field_moves_like_the_one_it_was(moving, scene):
-    again = load_field(save_field(moving, np.zeros((2, 5))))
+    again = load_field(save_field(moving, np.zeros((1, 4, 3)), np.zeros((2, 5))))
     assert np.allclose(deform(scene, again, 0.4).mean, deform(scene, moving, 0.4).mean, atol=1e-6)
 
 
 def test_a_field_whose_layout_does_not_fit_is_refused(moving):
-    stored = save_field(moving, np.zeros((2, 5)))
+    stored = save_field(moving, np.zeros((1, 4, 3)), np.zeros((2, 5)))
     with pytest.raises(Problem, match="announces"):
         load_field(replace(stored, planes=stored.planes[:-1]))
 

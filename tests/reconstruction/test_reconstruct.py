@@ -107,7 +107,10 @@ def test_a_phase_moves_what_it_says_and_nothing_else(fit, phase):
     fit.step(phase, 6, 1)
     moved = {name for name, t in fit.adam.tensors.items() if not torch.equal(t.detach(), before[name])}
     field = {"planes", *fit.head}
-    assert moved == (set(ATTRIBUTES) if phase.moves_canonical else set()) | (field if phase.moves_field else set())
+    colours = {name for name in moved if name in fit.tint}
+    assert bool(colours) == phase.recolours
+    moves = (set(ATTRIBUTES) if phase.moves_canonical else set()) | (field if phase.moves_field else set())
+    assert moved - colours == moves
 
 
 @pytest.mark.parametrize("iteration", [0, 1, 2])

@@ -251,7 +251,8 @@ def _deformation(world: World) -> Deformation:
     phase = np.digitize(i, [2500, 3500, 4500])
     loss = 0.2 * np.exp(-i / 700) + 0.01
     history = np.stack([i, loss, quality, 900 + i / 10, phase], -1).astype(np.float32)
-    return Deformation(np.zeros(8, np.float32), np.zeros(8, np.float32), "{}", np.zeros(4), np.ones(4), history)
+    planes, weights, tint = np.zeros(8, np.float32), np.zeros(8, np.float32), np.zeros((1, 2, 3), np.float16)
+    return Deformation(planes, weights, "{}", np.zeros(4), np.ones(4), tint, history)
 
 
 def _physics() -> Physics:

@@ -1,0 +1,53 @@
+"""Light that stays where it is while tissue moves under it changes colours, and moves nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_reconstruct import parts
+
+from surgisim.deformation.field import displace, load_field
+from surgisim.gaussians.reconstruct import reconstruct
+from surgisim.gaussians.tint import knots, shares, tinted
+
+
+@pytest.mark.parametrize("count", [1, 4, 7])
+def test_shares_begin_at_nothing_and_go_on_evenly(count):
+    clocks = np.linspace(0, 1, 50)
+    total = np.array([sum(shares(c, count).values()) for c in clocks])
+    assert total[0] == 0
+    assert np.allclose(total, np.minimum(clocks * count, 1.0))
+    assert shares(1.0, count) == {count - 1: 1.0}
+
+
+def test_colours_at_a_knot_are_its_own_and_between_two_the_middle():
+    color, at_knots = np.full((3, 3), 0.4), np.random.default_rng(0).normal(size=(5, 3, 3)).astype(np.float16)
+    assert np.allclose(tinted(color, at_knots, 0.4), color + at_knots[1])
+    assert np.allclose(tinted(color, at_knots, 0.5), color + (at_knots[1] + at_knots[2].astype(float)) / 2, atol=1e-3)
+    assert np.array_equal(tinted(color, at_knots, 0.0), color)
+
+
+def test_there_are_knots_for_any_clip():
+    assert [knots(0.3, n) for n in (1, 2, 11, 158)] == [1, 1, 3, 47]
+
+
+def test_a_light_that_comes_is_learned_and_moves_nothing(clip):
+    """The right half grows brighter through the clip; nothing but colours can tell."""
+    count, height, width = clip.depth.z.shape
+    still = np.repeat(clip.inpainted.rgb[:1], count, 0).astype(float)
+    lit = np.where(np.arange(width) > width / 2, 1 + 0.5 * np.linspace(0, 1, count)[:, None], 1.0)[:, None, :, None]
+    rgb = np.rint(np.clip(still * lit, 0, 255)).astype(np.uint8)
+    inpainted = replace(clip.inpainted, rgb=rgb, origin=np.zeros_like(clip.inpainted.origin))
+    masks = replace(clip.masks, tool=clip.masks.tool & False, tissue=np.ones_like(clip.masks.tissue))
+    wrong, moved = {}, {}
+    for tint in (0.01, 1e3):
+        settings = clip.settings.model_copy(update={"tint": tint})
+        done = reconstruct(*parts(clip, inpainted=inpainted, masks=masks, settings=settings))
+        held = clip.frames.split == 1
+        wrong[tint] = np.mean((done.rendered.rgb[held] / 255 - rgb[held] / 255) ** 2)
+        start = np.stack(np.mgrid[8 : width - 8 : 4, 8 : height - 8 : 4], -1).reshape(-1, 2).astype(float)
+        rest = clip.camera.lift(start, np.full(len(start), clip.z))
+        there = displace(rest, load_field(done.deformation), (count - 1) / clip.camera.fps)
+        moved[tint] = np.median(np.linalg.norm(clip.camera.project(there) - start, axis=1))
+    assert wrong[0.01] < 0.5 * wrong[1e3]
+    assert moved[0.01] < 1.2 * moved[1e3]
