@@ -10,7 +10,7 @@ from surgisim.config.base import Settings
 class Reconstruction(Settings):
     iterations: int = Field(5000, ge=10)
     """Optimisation steps, one frame each [1]."""
-    phases: tuple[float, float, float] = (0.2, 0.5, 0.9)
+    phases: tuple[float, float, float] = (0.5, 0.7, 0.9)
     """Ends of the coarse phase, of the trajectory phase and of the field's refinement; from the last on the field is
     frozen and the canonical scene refined [fraction of iterations]."""
     seed: int = 0
@@ -74,8 +74,8 @@ class Reconstruction(Settings):
     """Weight of a pixel whose colour was copied from another frame; seen tissue weighs 1 [1]."""
     weight_invented: float = Field(0.03, ge=0, le=1)
     """Weight of a pixel whose colour was invented [1]."""
-    weight_specular: float = Field(1.0, ge=0, le=1)
-    """Weight of a highlight [1]."""
+    weight_specular: float = Field(0.3, ge=0, le=1)
+    """Weight of a highlight as long as colours stay as they are; then it weighs 1 [1]."""
 
     rate_mean: float = Field(2e-4, gt=0)
     """Step size of the centres [half longest side of the box]."""

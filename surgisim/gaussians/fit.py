@@ -149,9 +149,10 @@ class Fit:
     def misfit(self, phase: Phase, image: Image, u: int) -> torch.Tensor:
         """Colour and depth of one frame against what was seen."""
         seen, settings = self.seen, self.settings
-        color = masked_l1(image.rgb, seen.rgb[u], seen.weight[u])
+        weight = (seen.weight if phase.recolours else seen.texture)[u]
+        color = masked_l1(image.rgb, seen.rgb[u], weight)
         if phase.number == 1 and settings.pooled:
-            wrong = ((image.rgb - seen.rgb[u]) * seen.weight[u][..., None]).permute(2, 0, 1)[None]
+            wrong = ((image.rgb - seen.rgb[u]) * weight[..., None]).permute(2, 0, 1)[None]
             for share in settings.pooled_sizes:
                 block = max(round(share * max(seen.z.shape[1:])), 1)
                 color = color + settings.pooled * avg_pool2d(wrong, block, max(block // 2, 1)).abs().mean()

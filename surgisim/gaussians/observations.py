@@ -26,6 +26,8 @@ class Observations:
     """Colour with the instrument taken out, sRGB 0-1, (U, H, W, 3)."""
     weight: torch.Tensor
     """How much each pixel's colour counts, 0-1, (U, H, W)."""
+    texture: torch.Tensor
+    """The same where colours are all that tells where tissue goes: highlights stay where they are, (U, H, W)."""
     z: torch.Tensor
     """Depth [m], (U, H, W)."""
     trust: torch.Tensor
@@ -33,7 +35,7 @@ class Observations:
 
     def on(self, device: torch.device) -> "Observations":
         """The same, on this device."""
-        moved = {name: getattr(self, name).to(device) for name in ("rgb", "weight", "z", "trust")}
+        moved = {name: getattr(self, name).to(device) for name in ("rgb", "weight", "texture", "z", "trust")}
         return Observations(frame=self.frame, **moved)
 
 
@@ -49,9 +51,11 @@ def observe(frames: Frames, inpainted: Inpainted, masks: Masks, depth: Depth, se
     origin, tool, tissue = (a[used] for a in (inpainted.origin, masks.tool, masks.tissue))
     # An instrument's pixel that was not painted over shows the instrument: it counts nothing.
     weight = ((origin == SEEN) & tissue & ~tool).astype(np.float32)
-    weight[(origin == SEEN) & masks.specular[used] & ~tool] = settings.weight_specular
     weight[origin == COPIED] = settings.weight_copied
     weight[origin == INVENTED] = settings.weight_invented
+    shining = (origin == SEEN) & masks.specular[used] & ~tool
+    weight[shining] = 1.0
+    texture = np.where(shining, np.float32(settings.weight_specular), weight)
     shown = (weight > 0) | tissue
     trust = depth.confidence[used].astype(np.float32) * shown
     if not weight[0].any():
@@ -60,6 +64,7 @@ def observe(frames: Frames, inpainted: Inpainted, masks: Masks, depth: Depth, se
         frame=used,
         rgb=torch.from_numpy(inpainted.rgb[used].astype(np.float32) / 255),
         weight=torch.from_numpy(weight),
+        texture=torch.from_numpy(texture),
         z=torch.from_numpy(depth.z[used].astype(np.float32)),
         trust=torch.from_numpy(trust),
     )
