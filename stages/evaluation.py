@@ -7,6 +7,7 @@ writes  metrics.json    Metrics
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.deformation import Deformation
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.fit import Fit
 from surgisim.artifacts.frames import Frames
@@ -35,6 +36,7 @@ from surgisim.stage import Maybe, Source, stage
         "tracks": Tracks,
         "motion": Motion,
         "scene": Scene,
+        "deformation": Deformation,
         "rendered": Frames,
         "body": Body,
         "physics": Physics,

@@ -49,14 +49,14 @@ from surgisim.stage import Bytes, Maybe, stage
     writes={"report": Bytes(".html")},
     settings=Report,
 )
-def main(*, deformation, material, metrics, truth, settings, progress, **artifacts):
+def main(*, material, metrics, truth, settings, progress, **artifacts):
     from surgisim.measure.run import Run
     from surgisim.measure.truth_seen import seen
     from surgisim.report.page import page
     from surgisim.report.story import Story
 
     run = Run(**artifacts, truth=truth and seen(truth, artifacts["camera"]))
-    return page(Story(run, deformation, material, metrics, settings), progress=progress)
+    return page(Story(run, material, metrics, settings), progress=progress)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.deformation import Deformation
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.fit import Fit
 from surgisim.artifacts.frames import Frames
@@ -31,6 +32,7 @@ class Run:
     motion: Motion
     """As estimation fitted it."""
     scene: Scene
+    deformation: Deformation
     rendered: Frames
     body: Body
     physics: Physics

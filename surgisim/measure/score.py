@@ -16,6 +16,7 @@ from surgisim.measure.groups.perception_by_phase import (
 from surgisim.measure.groups.physics import physics
 from surgisim.measure.groups.reconstruction import reconstruction
 from surgisim.measure.groups.replay import replay
+from surgisim.measure.groups.scene_geometry import scene_geometry
 from surgisim.measure.groups.simulation import simulation
 from surgisim.measure.groups.simulation_by_phase import simulation_by_phase
 from surgisim.measure.groups.tracking import tracking
@@ -33,6 +34,7 @@ def score(run: Run, *, lpips: Lpips | None, first: int, progress=lambda *_: None
         "tracking": lambda: tracking(run) | tracking_by_phase(run),
         "grasp": lambda: grasp(run) | grip_path(run),
         "reconstruction": lambda: reconstruction(run, lpips, first) | reconstruction_by_phase(run),
+        "scene": lambda: scene_geometry(run),
         "simulation": lambda: simulation(run, lpips) | simulation_by_phase(run),
         "replay": lambda: replay(run),
         "physics": lambda: physics(run),

@@ -19,7 +19,7 @@ def plots(story: Story) -> dict[str, str | None]:
     """Name -> figure; None where there is nothing to draw."""
     run = story.run
     return {
-        "history": history(story.deformation.history) if len(story.deformation.history) > 1 else None,
+        "history": history(story.run.deformation.history) if len(story.run.deformation.history) > 1 else None,
         "psnr": _psnr(story),
         "error": _error(story),
         "movement": _movement(story),

@@ -1,11 +1,10 @@
-"""What is drawn, gathered once: a run with its deformation, material and numbers."""
+"""What is drawn, gathered once: a run with its material and numbers."""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from surgisim.artifacts.deformation import Deformation
 from surgisim.artifacts.material import Material
 from surgisim.artifacts.metrics import Metrics
 from surgisim.config.report import Report
@@ -18,7 +17,6 @@ from surgisim.report.moments import moments
 @dataclass(frozen=True)
 class Story:
     run: Run
-    deformation: Deformation
     material: Material
     metrics: Metrics
     settings: Report

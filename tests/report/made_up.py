@@ -23,6 +23,7 @@ from surgisim.artifacts.replay import Replay
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.artifacts.truth import Truth
+from surgisim.deformation.field import save_field, still_field
 
 RADIUS, REACH, PULL = 0.004, 0.009, np.array([0.003, -0.006, -0.004])
 """Of the grip, of the field it drags along, and how far it goes [m]."""
@@ -251,8 +252,9 @@ def _deformation(world: World) -> Deformation:
     phase = np.digitize(i, [2500, 3500, 4500])
     loss = 0.2 * np.exp(-i / 700) + 0.01
     history = np.stack([i, loss, quality, 900 + i / 10, phase], -1).astype(np.float32)
-    planes, weights, tint = np.zeros(8, np.float32), np.zeros(8, np.float32), np.zeros((1, 2, 3), np.float16)
-    return Deformation(planes, weights, "{}", np.zeros(4), np.ones(4), tint, history)
+    sizes, duration = np.array([[3, 3, 2, 3]]), world.camera.frames / world.camera.fps
+    field = still_field(np.array([-0.1, -0.1, 0.01, 0.0]), np.array([0.1, 0.1, 0.2, duration]), sizes, 2, 4, world.rng)
+    return save_field(field, np.zeros((1, 2, 3)), history)
 
 
 def _physics() -> Physics:

@@ -35,7 +35,7 @@ def story(made, **changed) -> Story:
     truth = made["truth"] and seen(made["truth"], made["camera"])
     run = Run(**{n: made[n] for n in NAMES}, truth=truth)
     metrics = Metrics("made_up", "main", score(run, lpips=None, first=4), COST)
-    return Story(run, made["deformation"], made["material"], metrics, Report(panel=120, cell=96))
+    return Story(run, made["material"], metrics, Report(panel=120, cell=96))
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ rule evaluation:
         tracks=upstream("tracking", "tracks.npz"),
         motion=upstream("estimation", "motion.npz"),
         scene=upstream("reconstruction", "scene.ply"),
+        deformation=upstream("reconstruction", "deformation.npz"),
         rendered=upstream("reconstruction", "rendered.npz"),
         body=upstream("estimation", "body.npz"),
         physics=upstream("estimation", "physics.json"),
@@ -44,7 +45,8 @@ rule evaluation:
         'python "$SURGISIM/stages/evaluation.py"'
         " --frames {input.frames} --camera {input.camera} --given {input.given} --masks {input.masks}"
         " --inpainted {input.inpainted} --depth {input.depth} --tracks {input.tracks}"
-        " --motion {input.motion} --scene {input.scene} --rendered {input.rendered}"
+        " --motion {input.motion} --scene {input.scene} --deformation {input.deformation}"
+        " --rendered {input.rendered}"
         " --body {input.body} --physics {input.physics} --fit {input.fit} --replay {input.replay}"
         " {params.truth} --found {input.found} --benchmarks {params.benchmarks}"
         " --metrics {output.metrics}"

@@ -1,0 +1,118 @@
+"""Whether the scene is a surface that moves as tissue does: a simulation needs that more than pictures that are alike.
+
+Colours alone do not say where tissue goes, and a scene may look right whose splats are anywhere.
+"""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+from scipy.spatial import Delaunay, cKDTree
+from scipy.special import expit
+
+from surgisim.deformation.field import displace, load_field
+from surgisim.measure.compared import OF_MOVING, from_start, moving
+from surgisim.measure.number import number, ranged
+from surgisim.measure.resample import ratio
+from surgisim.measure.run import Run
+
+FRAMES = 24
+"""Frames that are looked at, evenly through the clip."""
+NEIGHBOURS = 6
+OPAQUE = 0.5
+"""Opacity from which a splat is part of the surface [1]."""
+BEFORE = 0.03
+"""How far before the surface a splat floats, as a share of the surface's distance."""
+TINY = 1e-9
+"""Distance below which neighbours lie on one another [m]."""
+SLIVER = 0.02
+"""Twice the area of a triangle below which it is none [px^2]."""
+SPIKE = 4.0
+"""Times the median of all splats' longest radii from which one is a spike."""
+
+
+def scene_geometry(run: Run) -> dict[str, dict[str, Any]]:
+    """Of the canonical scene and of where its field carries it."""
+    return _against_tracks(run) | _of_neighbours(run) | _at_rest(run)
+
+
+def _against_tracks(run: Run) -> dict[str, dict[str, Any]]:
+    """Where the field carries tracked points, and where they were seen."""
+    tracks, camera, field = run.tracks, run.camera, load_field(run.deformation)
+    rest = tracks.xyz[:, 0].astype(float)
+    counted = tracks.visible & (tracks.visible[:, 0] & np.isfinite(rest).all(1))[:, None]
+    counted[:, 0] = False
+    seen = from_start(tracks.xy)
+    counted &= moving(seen, counted, counted.any(1))
+    known = counted.any(1)
+    start, away = camera.project(rest[known]), np.zeros(counted.shape)
+    for t in range(1, camera.frames):
+        carried = camera.project(displace(rest[known], field, t / camera.fps)) - start
+        away[known, t] = np.linalg.norm(carried - seen[known, t], axis=-1)
+    ours, still = (np.where(counted, d, 0).sum(1) for d in (away, np.linalg.norm(seen, axis=-1)))
+    of = f"{OF_MOVING}, all frames in which they are seen, in the picture"
+    words = {
+        "motion": (
+            ratio(ours, counted.sum(1)),
+            "px",
+            f"mean distance of where the field carries points from tracks, {of}",
+        ),
+        "motion_still": (ratio(still, counted.sum(1)), "px", f"the same of a scene that stands still: {of}"),
+        "motion_share": (ratio(ours, still), "%", f"distance from tracks as a share of that of a still scene: {of}"),
+    }
+    return {
+        name: ranged(found, unit, how, factor=100 if unit == "%" else 1, why_not="no moving point is tracked")
+        for name, (found, unit, how) in words.items()
+    }
+
+
+def _of_neighbours(run: Run) -> dict[str, dict[str, Any]]:
+    """How the surface's splats move beside each other."""
+    scene, camera, field = run.scene, run.camera, load_field(run.deformation)
+    rest = scene.mean[expit(scene.opacity) > OPAQUE].astype(float)
+    if len(rest) <= NEIGHBOURS:
+        return {}
+    pairs = cKDTree(rest).query(rest, NEIGHBOURS + 1)[1][:, 1:]
+    corners = Delaunay(camera.project(rest)).simplices
+    # Slivers turn over by rounding alone.
+    corners = corners[abs(_areas(camera.project(rest), corners)) > SLIVER]
+    length, area = _lengths(rest, pairs), _areas(camera.project(rest), corners)
+    strain, folded = [], []
+    for t in np.unique(np.linspace(0, camera.frames - 1, FRAMES).round().astype(int)):
+        now = displace(rest, field, t / camera.fps)
+        strain.append(abs(np.log(np.maximum(_lengths(now, pairs), TINY) / np.maximum(length, TINY))))
+        folded.append((_areas(camera.project(now), corners) * area < 0).mean())
+    of = f"opaque splats, {len(strain)} frames evenly through the clip"
+    apart = f"|ln| of the distance of {NEIGHBOURS} neighbours over that at rest, 95th percentile: {of}"
+    over = f"triangles between neighbours in the picture that are turned over, in the worst frame: {of}"
+    return {
+        "strain_95": number(np.percentile(strain, 95), "1", apart),
+        "folded": number(100 * np.max(folded), "%", over),
+    }
+
+
+def _at_rest(run: Run) -> dict[str, dict[str, Any]]:
+    """Splats of the canonical scene that lie before the surface, or stick out of it."""
+    scene, z = run.scene, run.depth.z[0].astype(float)
+    row, column = np.clip(run.camera.project(scene.mean.astype(float))[:, ::-1].T, 0, np.array(z.shape)[:, None] - 1)
+    surface = map_coordinates(z, [row, column], order=1)
+    opacity, longest = expit(scene.opacity.astype(float)), np.exp(scene.scale.astype(float)).max(1)
+    floats = scene.mean[:, 2] < (1 - BEFORE) * surface
+    before = f"share of all opacity that lies before the depth of frame 0 by more than {BEFORE:.0%} of its distance"
+    long = f"splats whose longest radius is over {SPIKE:g} times the median one"
+    return {
+        "floating": number(100 * opacity[floats].sum() / opacity.sum(), "%", before),
+        "spikes": number(100 * (longest > SPIKE * np.median(longest)).mean(), "%", long),
+    }
+
+
+def _lengths(points: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Distances of points (N, 3) to others (N, K), (N, K)."""
+    return np.linalg.norm(points[pairs] - points[:, None], axis=-1)
+
+
+def _areas(pixels: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Twice the signed areas of triangles (M, 3) of places (N, 2), (M,)."""
+    (ax, ay), (bx, by) = ((pixels[b] - pixels[a]).T for a, b in pairwise(corners.T))
+    return ax * by - ay * bx
