@@ -9,6 +9,7 @@ from slab_clip import FPS, TRUE, T
 
 from surgisim.estimation import bearing
 from surgisim.estimation.bearing import GRIPS, SQUEEZED, YIELDS, borne, handed_on
+from surgisim.estimation.fit import _on_finer
 from surgisim.estimation.search import search
 from surgisim.estimation.trial import Trial
 from surgisim.mpm.carried import Carried
@@ -73,6 +74,20 @@ def test_a_pull_that_no_grip_bears_is_refused():
     with pytest.raises(Problem, match="however softly"):
         handed_on(trial, start(trial), theta, history)
     assert history[-1]["share"] < GRIPS[-1] / YIELDS
+
+
+def test_a_finer_grid_that_does_not_bear_the_grip_is_left(monkeypatch):
+    """Held as on the wider grid, not softer; a field is brought along as it is beside the uniform parameters."""
+    trial, theta = settled(3.0)
+    values, history, field = start(trial), [], theta.copy()
+    field[: len(field) // 2] *= 1.1
+    fine, there, run = _on_finer(trial, values, trial, values, field, history)
+    assert fine.grip == trial.grip
+    np.testing.assert_allclose(there, field)
+    assert history == []
+    monkeypatch.setattr(bearing, "SQUEEZED", least(fine, run) + 0.02)
+    assert _on_finer(trial, values, trial, values, field, history) is None
+    assert [(row["round"], row["cost"]) for row in history] == [("finer grid", None)]
 
 
 def run_into_one_another(trial: Trial, farther: float) -> Trial:
