@@ -4,12 +4,15 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from surgisim.estimation.bearing import with_margin
 from surgisim.estimation.gauss_newton import Solution, derivative
 from surgisim.estimation.otherwise import STEPS, Otherwise, on_no_grid, settled
 from surgisim.estimation.rounds import number, plain
 from surgisim.estimation.trial import WORKERS, Trial
-from surgisim.mpm.simulator import Breakdown
+from surgisim.mpm.setup import Values
+from surgisim.mpm.simulator import Breakdown, Run
 
 FINER, NEARLY = 1.5, 2e-3
 """How many times finer the grid is that a fit ends on, and the share of its cost that a step must win there at last;
@@ -52,3 +55,33 @@ def finely(trial: Trial, solution: Solution, history: list, say: Say) -> tuple[T
     found = settled(Otherwise("finer grid", alone, begin=found.x, residual=found.residual), here, enough=NEARLY)
     history.append({"round": "finer grid", "cost": number(found.cost)} | plain(wanted, found.x))
     return fine, replace(here, x=found.x, residual=found.residual)
+
+
+def brought(field: np.ndarray, coarse: Trial, uniform: Values, trial: Trial, values: Values) -> np.ndarray:
+    """A field over the particles of one settled trial, (P, M), that was found beside `uniform`, as one over another's.
+
+    Each particle there is as many times stiffer than `values` as the nearest here is than `uniform`.
+    """
+    even = coarse.theta(uniform)
+    if trial is coarse and values == uniform:
+        return field
+    ratio = np.where(even != 0, field / np.where(even != 0, even, 1.0), 1.0)
+    near = cKDTree(coarse.bodies[0].body.rest).query(trial.bodies[0].body.rest)[1]
+    return trial.theta(values) * ratio[near]
+
+
+def on_finer_grid(
+    fine: Trial, values: Values, coarse: Trial, uniform: Values, field: np.ndarray, history: list
+) -> tuple[Trial, np.ndarray, Run] | None:
+    """A settled trial on a finer grid, held as the coarse one is, with that one's field, (P, M), and the run of it.
+
+    None, with a line in `history`, where it does not bear that: held softer it would follow the grip less.
+    """
+    edge_kept = {"rim": coarse.motion.rim, "rim_radius": coarse.motion.rim_radius}
+    fine = replace(fine, grip=coarse.grip, motion=replace(fine.motion, **edge_kept))
+    theta = brought(field, coarse, uniform, fine, values)
+    try:
+        return fine, theta, with_margin(fine, values, theta)
+    except Breakdown as breakdown:
+        history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
+        return None

@@ -6,7 +6,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
@@ -20,11 +19,11 @@ from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
-from surgisim.estimation.bearing import borne, handed_on, with_margin
+from surgisim.estimation.bearing import borne, handed_on
 from surgisim.estimation.carrying import OPENS, carrying, course
 from surgisim.estimation.damping import numerical_damping
 from surgisim.estimation.doubts import doubts, none, spreads
-from surgisim.estimation.finer import finely
+from surgisim.estimation.finer import brought, finely, on_finer_grid
 from surgisim.estimation.gauss_newton import Solution
 from surgisim.estimation.hold import ask_hold
 from surgisim.estimation.identify import identifiability, in_words
@@ -65,7 +64,7 @@ from surgisim.estimation.trial import SAFETY, WORKERS, Trial, workers
 from surgisim.estimation.written import physics_of, unfitted
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import SKIN, Prepared, Values, prepare
-from surgisim.mpm.simulator import Breakdown, Run
+from surgisim.mpm.simulator import Run
 from surgisim.physics.catalogue import choose, columns
 from surgisim.physics.place import Place
 from surgisim.problem import Problem
@@ -215,7 +214,7 @@ def estimate(
         field, refined = _refined(coarse, uniform, wide.eased or 0.0, scene, frames, masks, camera, settings, progress)
     on_finer = None
     if finer:
-        on_finer = _on_finer(alone(trial.settled(x)), trial.wanted.values(x), coarse, uniform, field, history)
+        on_finer = on_finer_grid(alone(trial.settled(x)), trial.wanted.values(x), coarse, uniform, field, history)
         if on_finer is None:
             trial, x = wide, wide_x
             table = _known(trial, wider, model, phase, settings)
@@ -223,10 +222,10 @@ def estimate(
     if on_finer:
         trial, theta, run = on_finer
     else:
-        trial, theta = coarse, _brought(field, coarse, uniform, coarse, values)
+        trial, theta = coarse, brought(field, coarse, uniform, coarse, values)
         # What nothing tells the pace of takes the same shapes in longer steps.
         there = trial.wanted.values(trial.wanted.paced(x, wide.eased or 0.0))
-        trial, run = handed_on(trial, there, _brought(theta, trial, values, trial, there), history)
+        trial, run = handed_on(trial, there, brought(theta, trial, values, trial, there), history)
     prepared, laid = trial.bodies[0], trial.bodies[0].body
     support = Support(depth, *edge, len(trial.motion.rim), loose, bool(len(laid.torn)))
     path = trial.drive(values, stiffest=prepared.stiffest(theta))
@@ -360,36 +359,6 @@ def _known(trial: Trial, solution: Solution, model: dict, phase: np.ndarray, set
         density=settings.density, length=trial.depth(x), independent=INDEPENDENT, region=trial.regions, model=model,
         wider=1.0 if measured else GUESSED,
     )  # fmt: skip
-
-
-def _brought(field: np.ndarray, coarse: Trial, uniform: Values, trial: Trial, values: Values) -> np.ndarray:
-    """A field over the particles of one settled trial, (P, M), that was found beside `uniform`, as one over another's.
-
-    Each particle there is as many times stiffer than `values` as the nearest here is than `uniform`.
-    """
-    even = coarse.theta(uniform)
-    if trial is coarse and values == uniform:
-        return field
-    ratio = np.where(even != 0, field / np.where(even != 0, even, 1.0), 1.0)
-    near = cKDTree(coarse.bodies[0].body.rest).query(trial.bodies[0].body.rest)[1]
-    return trial.theta(values) * ratio[near]
-
-
-def _on_finer(
-    fine: Trial, values: Values, coarse: Trial, uniform: Values, field: np.ndarray, history: list
-) -> tuple[Trial, np.ndarray, Run] | None:
-    """A settled trial on a finer grid, held as the coarse one is, with that one's field, (P, M), and the run of it.
-
-    None, with a line in `history`, where it does not bear that: held softer it would follow the grip less.
-    """
-    edge_kept = {"rim": coarse.motion.rim, "rim_radius": coarse.motion.rim_radius}
-    fine = replace(fine, grip=coarse.grip, motion=replace(fine.motion, **edge_kept))
-    theta = _brought(field, coarse, uniform, fine, values)
-    try:
-        return fine, theta, with_margin(fine, values, theta)
-    except Breakdown as breakdown:
-        history.append({"round": "finer grid", "cost": None, "broke": str(breakdown)})
-        return None
 
 
 def _part(progress: Say, begin: float, end: float) -> Say:

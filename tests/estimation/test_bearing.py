@@ -9,7 +9,7 @@ from slab_clip import FPS, TRUE, T
 
 from surgisim.estimation import bearing
 from surgisim.estimation.bearing import GRIPS, SQUEEZED, YIELDS, borne, handed_on
-from surgisim.estimation.fit import _on_finer
+from surgisim.estimation.finer import on_finer_grid
 from surgisim.estimation.search import search
 from surgisim.estimation.trial import Trial
 from surgisim.mpm.carried import Carried
@@ -81,12 +81,12 @@ def test_a_finer_grid_that_does_not_bear_the_grip_is_left(monkeypatch):
     trial, theta = settled(3.0)
     values, history, field = start(trial), [], theta.copy()
     field[: len(field) // 2] *= 1.1
-    fine, there, run = _on_finer(trial, values, trial, values, field, history)
+    fine, there, run = on_finer_grid(trial, values, trial, values, field, history)
     assert fine.grip == trial.grip
     np.testing.assert_allclose(there, field)
     assert history == []
     monkeypatch.setattr(bearing, "SQUEEZED", least(fine, run) + 0.02)
-    assert _on_finer(trial, values, trial, values, field, history) is None
+    assert on_finer_grid(trial, values, trial, values, field, history) is None
     assert [(row["round"], row["cost"]) for row in history] == [("finer grid", None)]
 
 
