@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from surgisim.estimation import finer, fit
+from surgisim.estimation import finer
 from surgisim.estimation.gauss_newton import Solution
 
 
@@ -52,8 +52,8 @@ def test_a_field_is_as_many_times_stiffer_at_the_same_place_on_another_grid():
     coarse, fine = laid([[0, 0, 0], [1, 0, 0]]), laid([[0.1, 0, 0], [0.4, 0, 0], [0.9, 0, 0]])
     field = np.array([[2000.0, 0.0], [500.0, 0.0]])
     at = {E: {"corotated": {"E": E}} for E in (1000.0, 900.0)}
-    brought = fit._brought(field, coarse, at[1000.0], fine, at[900.0])
-    assert brought.tolist() == [[1800.0, 0.0], [1800.0, 0.0], [450.0, 0.0]]
+    there = finer.brought(field, coarse, at[1000.0], fine, at[900.0])
+    assert there.tolist() == [[1800.0, 0.0], [1800.0, 0.0], [450.0, 0.0]]
 
 
 @dataclass(frozen=True)
