@@ -81,12 +81,13 @@ def test_a_finer_grid_that_does_not_bear_the_grip_is_left(monkeypatch):
     trial, theta = settled(3.0)
     values, history, field = start(trial), [], theta.copy()
     field[: len(field) // 2] *= 1.1
-    fine, there, run = on_finer_grid(trial, values, trial, values, field, history)
-    assert fine.grip == trial.grip
+    coarse = dataclasses.replace(trial, grip=0.8)
+    fine, there, run = on_finer_grid(trial, values, coarse, values, field, history)
+    assert fine.grip == 0.8
     np.testing.assert_allclose(there, field)
     assert history == []
     monkeypatch.setattr(bearing, "SQUEEZED", least(fine, run) + 0.02)
-    assert on_finer_grid(trial, values, trial, values, field, history) is None
+    assert on_finer_grid(trial, values, coarse, values, field, history) is None
     assert [(row["round"], row["cost"]) for row in history] == [("finer grid", None)]
 
 

@@ -1,4 +1,4 @@
-"""Light that stays where it is while tissue moves under it changes colours, and moves nothing."""
+"""What light does to colours is learned as such, and moves the surface hardly more than where colours have to stay."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ def test_there_are_knots_for_any_clip():
     assert [knots(0.3, n) for n in (1, 2, 11, 158)] == [1, 1, 3, 47]
 
 
-def test_a_light_that_comes_is_learned_and_moves_nothing(clip):
+def test_a_light_that_comes_is_learned_and_moves_hardly_more_than_without(clip):
     """The right half grows brighter through the clip; nothing but colours can tell."""
     count, height, width = clip.depth.z.shape
     still = np.repeat(clip.inpainted.rgb[:1], count, 0).astype(float)

@@ -23,7 +23,7 @@ NEIGHBOURS = 6
 OPAQUE = 0.5
 """Opacity from which a splat is part of the surface [1]."""
 BEFORE = 0.03
-"""How far before the surface a splat floats, as a share of the surface's distance."""
+"""How far before the surface a splat floats, as a share of the surface's distance; chosen, as SPIKE."""
 TINY = 1e-9
 """Distance below which neighbours lie on one another [m]."""
 SLIVER = 0.02
