@@ -1,10 +1,11 @@
 """Follow points of the tissue, and find where and when the instrument holds it.
 
-reads   frames.npz, masks.npz, depth.npz, camera.json
+reads   frames.npz, masks.npz, correspondence.npz, depth.npz, camera.json
 writes  tracks.npz  Tracks [px], camera frame [m]   motion.npz  Motion, camera frame [m]
 """
 
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.correspondence import Correspondence
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.masks import Masks
@@ -15,14 +16,14 @@ from surgisim.stage import stage
 
 
 @stage(
-    reads={"frames": Frames, "masks": Masks, "depth": Depth, "camera": Camera},
+    reads={"frames": Frames, "masks": Masks, "correspondence": Correspondence, "depth": Depth, "camera": Camera},
     writes={"tracks": Tracks, "motion": Motion},
     settings=Tracking,
 )
-def main(frames, masks, depth, camera, *, settings, progress):
+def main(frames, masks, correspondence, depth, camera, *, settings, progress):
     from surgisim.perception.tracking.follow import follow
 
-    return follow(frames, masks, depth, camera, settings, progress=progress)
+    return follow(frames, masks, correspondence, depth, camera, settings, progress=progress)
 
 
 if __name__ == "__main__":

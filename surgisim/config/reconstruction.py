@@ -10,7 +10,7 @@ from surgisim.config.base import Settings
 class Reconstruction(Settings):
     iterations: int = Field(5000, ge=10)
     """Optimisation steps, one frame each [1]."""
-    phases: tuple[float, float, float] = (0.5, 0.7, 0.9)
+    phases: tuple[float, float, float] = (0.2, 0.5, 0.9)
     """Ends of the coarse phase, of the trajectory phase and of the field's refinement; from the last on the field is
     frozen and the canonical scene refined [fraction of iterations]."""
     seed: int = 0
@@ -46,6 +46,9 @@ class Reconstruction(Settings):
     """'default' asks neighbours for equal motion, 'literal' is the paper's printed sum of dot products [-]."""
     neighbours: int = Field(5, ge=1)
     """Neighbours of each Gaussian in the trajectory term [1]."""
+    correspondence: float = Field(0.1, ge=0)
+    """Weight of how far the field carries Gaussians past where the surface was seen to go, 0 switches it off; of
+    errors counted in 1 % of the longest image side [1]."""
     anisotropy: float = Field(1.0, ge=0)
     """Weight of the anisotropic term, 0 switches it off [1]."""
     anisotropy_largest: float = Field(1.0, gt=0)

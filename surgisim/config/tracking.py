@@ -28,8 +28,6 @@ class Tracking(Settings):
     """Points spread over frame 0's tissue [points]."""
     points_near_grasp: Annotated[int, Field(ge=0, le=20000)] = 200
     """Further points close to what is grasped [points]."""
-    margin: Annotated[float, Field(ge=0, le=0.2)] = 0.012
-    """How far around an instrument motion is not believed, as a share of the longer image side [1]."""
     patch: Annotated[float, Field(gt=0, le=0.2)] = 0.025
     """Half the side of the patch a point is recognised by, as a share of the longer image side [1]."""
     grasp: tuple[Grasp, ...] = ()

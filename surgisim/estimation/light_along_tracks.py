@@ -9,7 +9,7 @@ from surgisim.lighting.headlight import linear_light
 from surgisim.lighting.veil import ABOVE, veil_of
 from surgisim.mpm.simulator import Simulator
 from surgisim.perception.tracking.between import sample
-from surgisim.perception.tracking.flow_chain import widen
+from surgisim.perception.tracking.correspond import widen
 
 SHAPE, FLOOR = 0.3, 0.02
 """Spread of the simulation's own error, as a share of the change nearby, and its least value."""

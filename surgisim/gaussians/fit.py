@@ -13,7 +13,7 @@ from surgisim.config.reconstruction import Reconstruction
 from surgisim.deformation.field import Field, still_field
 from surgisim.gaussians.adam import Adam
 from surgisim.gaussians.densify import ATTRIBUTES, Record, renew
-from surgisim.gaussians.losses import anisotropic, masked_l1, trajectory
+from surgisim.gaussians.losses import anisotropic, followed, masked_l1, trajectory
 from surgisim.gaussians.neighbours import groups
 from surgisim.gaussians.observations import Observations
 from surgisim.gaussians.rasterise import Image, engine_on, rasterise
@@ -130,7 +130,7 @@ class Fit:
             weigh=recorded and (on_cpu or iteration % WEIGHED_EVERY == 0),
             checked=on_cpu,
         )
-        loss = self.misfit(phase, image, u) + self.priors(phase, field, radius, moved, time, iteration)
+        loss = self.misfit(phase, image, u) + self.priors(phase, field, radius, moved, u, iteration)
         if self.settings.tint and torch.is_tensor(added):
             loss = loss + self.settings.tint * added.abs().mean()
         loss.backward()
@@ -161,10 +161,10 @@ class Fit:
         return color + settings.depth * depth
 
     def priors(
-        self, phase: Phase, field: Field, radius: torch.Tensor, moved: torch.Tensor, time: float, iteration: int
+        self, phase: Phase, field: Field, radius: torch.Tensor, moved: torch.Tensor, u: int, iteration: int
     ) -> torch.Tensor:
         """What is asked of scene and field besides the picture."""
-        settings = self.settings
+        settings, time = self.settings, self.seen.frame[u] / self.camera.fps
         total = radius.new_zeros(())
         if settings.anisotropy:
             unit = settings.anisotropy_unit * self.radius
@@ -182,7 +182,20 @@ class Fit:
         if phase.moves_field:
             space, rough = field.roughness()
             total = total + settings.smoothness_space * space + settings.smoothness_time * rough
+        if phase.moves_field and settings.correspondence and time > 0:
+            total = total + settings.correspondence * self.astray(moved, u)
         return total
+
+    def astray(self, moved: torch.Tensor, u: int) -> torch.Tensor:
+        """How far the field carries Gaussians past where the surface was seen to go; the scene at rest is left be."""
+        rest = self.adam.tensors["mean"].detach()
+        start = pixels(rest, self.camera)
+        height, width = self.seen.sure.shape[1:]
+        column, row = start.round().long().unbind(1)
+        inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
+        place = row.clamp(0, height - 1), column.clamp(0, width - 1)
+        went, sure = self.seen.went[u][place].float(), self.seen.sure[u][place].float() * inside
+        return followed(pixels(rest + moved, self.camera) - start, went, sure, unit=0.01 * max(height, width))
 
     def renew(self) -> None:
         """Drop and split Gaussians."""
@@ -202,6 +215,12 @@ class Fit:
         arrays["rotation"] /= np.linalg.norm(arrays["rotation"], axis=1, keepdims=True)
         at_knots = np.stack([self.adam.tensors[name].cpu().numpy() for name in self.tint])
         return Scene(**arrays), self.current_field().on(torch.device("cpu")), at_knots
+
+
+def pixels(points: torch.Tensor, camera: Camera) -> torch.Tensor:
+    """Pixels of points, camera frame [m], (G, 3) -> [px], (G, 2)."""
+    x, y, z = points.unbind(1)
+    return torch.stack([camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy], 1)
 
 
 def first_field(

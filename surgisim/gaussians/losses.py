@@ -51,6 +51,20 @@ def trajectory(step: torch.Tensor, groups: torch.Tensor, *, literal: bool = Fals
     return 2 * (moves - middle[:, None]).square().sum(2).mean()
 
 
+def followed(
+    moved: torch.Tensor, went: torch.Tensor, sure: torch.Tensor, *, unit: float, soft: float = 0.1
+) -> torch.Tensor:
+    """Keeps points where they were seen to go.
+
+        L_fol = sum_i w_i (sqrt(|m_i - g_i|^2 / u^2 + s^2) - s) / sum_i w_i
+
+    moved, went: m, how far points have gone in the picture, and g, how far they were seen to go [px], (G, 2). sure: w,
+    how much that counts, 0-1, (G,). unit: u [px]. soft: s, below which the square counts [unit].
+    """
+    away = ((moved - went) / unit).square().sum(1)
+    return (sure * ((away + soft**2).sqrt() - soft)).sum() / sure.sum().clamp(min=1)
+
+
 def total_variation(value: torch.Tensor, neighbours: torch.Tensor) -> torch.Tensor:
     """Keeps a quantity alike between neighbours, and free to jump where it must.
 

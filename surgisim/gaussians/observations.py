@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from surgisim.artifacts.correspondence import Correspondence
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.frames import BETWEEN, Frames
 from surgisim.artifacts.inpainted import COPIED, INVENTED, SEEN, Inpainted
@@ -32,17 +33,28 @@ class Observations:
     """Depth [m], (U, H, W)."""
     trust: torch.Tensor
     """How much each pixel's depth counts, 0-1, (U, H, W)."""
+    went: torch.Tensor
+    """How far frame 0's pixels were seen to go [px], (U, H, W, 2), half precision."""
+    sure: torch.Tensor
+    """How much that counts, 0-1, (U, H, W), half precision."""
 
     def on(self, device: torch.device) -> "Observations":
         """The same, on this device."""
-        moved = {name: getattr(self, name).to(device) for name in ("rgb", "weight", "texture", "z", "trust")}
-        return Observations(frame=self.frame, **moved)
+        names = "rgb", "weight", "texture", "z", "trust", "went", "sure"
+        return Observations(frame=self.frame, **{name: getattr(self, name).to(device) for name in names})
 
 
-def observe(frames: Frames, inpainted: Inpainted, masks: Masks, depth: Depth, settings: Reconstruction) -> Observations:
+def observe(
+    frames: Frames,
+    inpainted: Inpainted,
+    masks: Masks,
+    surface: Correspondence,
+    depth: Depth,
+    settings: Reconstruction,
+) -> Observations:
     """The used frames with their weights. Raises Problem if the inputs are not of one clip."""
     sizes = {"frames": frames.rgb.shape[:3], "inpainted": inpainted.rgb.shape[:3]}
-    sizes |= {"masks": masks.tool.shape, "depth": depth.z.shape}
+    sizes |= {"masks": masks.tool.shape, "correspondence": surface.hidden.shape, "depth": depth.z.shape}
     if len(set(sizes.values())) > 1:
         raise Problem(f"reconstruction: {sizes} are not of one clip (frames, height, width). Check which are passed.")
     used = np.flatnonzero(frames.split != BETWEEN)
@@ -67,4 +79,6 @@ def observe(frames: Frames, inpainted: Inpainted, masks: Masks, depth: Depth, se
         texture=torch.from_numpy(texture),
         z=torch.from_numpy(depth.z[used].astype(np.float32)),
         trust=torch.from_numpy(trust),
+        went=torch.from_numpy(surface.moved[used]),
+        sure=torch.from_numpy(surface.seen[used] / (1 + surface.error[used] ** 2)),
     )

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.correspondence import Correspondence
 from surgisim.artifacts.deformation import Deformation
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.frames import Frames
@@ -43,6 +44,7 @@ def reconstruct(
     frames: Frames,
     inpainted: Inpainted,
     masks: Masks,
+    surface: Correspondence,
     depth: Depth,
     camera: Camera,
     settings: Reconstruction,
@@ -60,7 +62,7 @@ def reconstruct(
             f"reconstruction: 'device' is cuda, which needs {missing}; this machine lacks it. Install it, or set "
             "reconstruction.device to cpu."
         )
-    seen = observe(frames, inpainted, masks, depth, settings)
+    seen = observe(frames, inpainted, masks, surface, depth, settings)
     start = initialise(
         inpainted.rgb[seen.frame],
         depth.z[seen.frame],

@@ -19,6 +19,7 @@ import numpy as np
 from PIL import Image
 
 from surgisim.artifacts.truth import Truth
+from surgisim.config.correspondence import Correspondence
 from surgisim.config.depth import Depth
 from surgisim.config.ingest import Ingest
 from surgisim.config.inpainting import Inpainting
@@ -33,6 +34,7 @@ from surgisim.perception.ingest.clip import ingest
 from surgisim.perception.ingest.video import opened
 from surgisim.perception.inpainting.removal import without_tool
 from surgisim.perception.masking.outline import masks
+from surgisim.perception.tracking.correspond import correspond
 from surgisim.phantom import block
 from surgisim.phantom.case import Case, invent
 from surgisim.phantom.clip import move, photograph
@@ -88,12 +90,13 @@ def measured(settings: Phantom, backends: list[str]) -> dict[str, float]:
         )
     found = masks(frames, given, Masking(), progress=quiet)
     inpainted = without_tool(frames, found, Inpainting(), progress=quiet)
+    surface = correspond(frames, found, Correspondence(), progress=quiet)
     to = seen(truth, camera)
     counted = to.visible & to.visible[:, :1] & to.motion.active[0].astype(bool)
     counted &= moving(from_start(to.xyz), counted, counted.any(1))
     errors = {}
     for backend in backends:
-        z = depth(frames, inpainted, found, given, camera, Depth(backend=backend), progress=quiet)
+        z = depth(frames, inpainted, found, surface, given, camera, Depth(backend=backend), progress=quiet)
         change = from_start(sampled(z.z, to.xy))
         # One factor for the clip where the scale is not known, as in the metrics.
         change *= 1.0 if z.scale == "known" else scale_between(z.z, to.depth, ~to.tool)

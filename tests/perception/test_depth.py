@@ -14,6 +14,7 @@ from surgisim.perception.depth.complete import complete
 from surgisim.perception.depth.distance import depth as of_frames
 from surgisim.perception.depth.guided import guided
 from surgisim.perception.tracking.between import sample
+from surgisim.perception.tracking.correspond import between
 from surgisim.problem import Problem
 
 NONE = np.zeros((0, 48, 64), np.float32)
@@ -53,7 +54,7 @@ def test_the_depth_that_explains_a_shading_is_the_one_that_made_it():
 
 def test_a_tilted_sheet_of_any_paint_is_found_tilted():
     sheet = pull_sheet(frames=2)
-    z, _ = near_light.estimate(sheet.rgb, sheet.tool, np.zeros_like(sheet.tool), sheet.camera)
+    z, _ = _near_light(sheet.rgb, sheet.tool, sheet.camera)
     slope = np.polyfit(sheet.depth[0].ravel(), z[0].ravel() * 0.07 / np.median(z[0]), 1)[0]
     assert np.corrcoef(z[0].ravel(), sheet.depth[0].ravel())[0, 1] > 0.8
     assert 0.4 < slope < 1.3
@@ -69,7 +70,7 @@ def test_a_slanted_view_is_found_as_slanted_as_it_is(smoke):
     seen = (1 - smoke) * np.clip(light[..., None] * [1.0, 0.6, 0.5], 0, 1) + 0.35 * smoke
     rgb = np.rint(255 * to_srgb(seen)).astype(np.uint8)[None]
     none = np.zeros(rgb.shape[:3], bool)
-    z, _ = near_light.estimate(rgb, none, none, cam)
+    z, _ = _near_light(rgb, none, cam)
     flat = np.concatenate([lattice.ray.reshape(-1, 2), np.ones((true.size, 1))], -1)
     slope = np.linalg.lstsq(flat, np.log(z[0]).ravel(), rcond=None)[0][:2]
     assert np.allclose(slope, [0.1, -0.6], atol=0.08)
@@ -78,7 +79,7 @@ def test_a_slanted_view_is_found_as_slanted_as_it_is(smoke):
 @pytest.mark.parametrize("pull", [(0.006, -0.004, -0.004), (-0.006, -0.004, 0.0)])
 def test_tissue_that_comes_nearer_is_told_from_tissue_that_only_slides(pull):
     sheet = pull_sheet(pull=pull, frames=14, begin=2, release=9)
-    z, _ = near_light.estimate(sheet.rgb, sheet.tool, np.zeros_like(sheet.tool), sheet.camera)
+    z, _ = _near_light(sheet.rgb, sheet.tool, sheet.camera)
     moved = np.linalg.norm(sheet.xyz[8] - sheet.xyz[0], axis=-1) > 1e-3
     change = (sample(z[8], sheet.position[8]) - z[0])[moved]
     true = (sheet.xyz[8] - sheet.xyz[0])[..., 2][moved]
@@ -197,7 +198,12 @@ def test_a_backend_without_its_input_says_what_it_wants(backend, word):
 def depth(inpainted, masks, given, cam, settings):
     """Of a recording from which nothing had to be taken away."""
     frames = Frames(inpainted.rgb, np.zeros(len(inpainted.rgb), np.uint8))
-    return of_frames(frames, inpainted, masks, given, cam, settings)
+    surface = between(inpainted.rgb, masks.tool)
+    return of_frames(frames, inpainted, masks, surface, given, cam, settings)
+
+
+def _near_light(rgb, tool, cam):
+    return near_light.estimate(rgb, tool, np.zeros_like(tool), cam, between(rgb, tool))
 
 
 def _clip(frames: int) -> tuple[Inpainted, Masks]:

@@ -7,10 +7,12 @@ from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.masks import Masks
 from surgisim.artifacts.motion import Motion
 from surgisim.config.base import parse
+from surgisim.config.correspondence import Correspondence
 from surgisim.config.tracking import Tracking
 from surgisim.perception.grasp.contact import distance, frame_flow
 from surgisim.perception.grasp.following import jaw_motion
 from surgisim.perception.grasp.instruments import instruments
+from surgisim.perception.tracking.correspond import correspond
 from surgisim.perception.tracking.follow import follow
 from surgisim.problem import Problem
 
@@ -104,4 +106,5 @@ def _motion(sheet, settings=None, *, tool=None, tissue=None) -> Motion:
     masks = Masks(tool, ~tool if tissue is None else tissue & ~tool, np.zeros_like(tool), np.ones(len(tool)))
     depth = Depth(sheet.depth.astype(np.float32), np.ones(sheet.depth.shape, np.float32), "known")
     frames = Frames(sheet.rgb, np.zeros(len(sheet.rgb), np.uint8))
-    return follow(frames, masks, depth, sheet.camera, parse(Tracking, settings or {}, "tracking"))[1]
+    surface = correspond(frames, masks, Correspondence())
+    return follow(frames, masks, surface, depth, sheet.camera, parse(Tracking, settings or {}, "tracking"))[1]

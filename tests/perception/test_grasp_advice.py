@@ -11,10 +11,12 @@ from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.masks import Masks
 from surgisim.clips import merge_entry
 from surgisim.config.base import parse
+from surgisim.config.correspondence import Correspondence
 from surgisim.config.tracking import Tracking
 from surgisim.perception.grasp.find import Grip
 from surgisim.perception.grasp.instruments import instruments
 from surgisim.perception.grasp.say import advice
+from surgisim.perception.tracking.correspond import correspond
 from surgisim.perception.tracking.follow import follow
 
 
@@ -50,7 +52,8 @@ def test_a_run_that_finds_no_grasp_says_how_to_mark_one(capsys):
     masks = Masks(sheet.tool, ~sheet.tool, np.zeros_like(sheet.tool), np.ones(len(sheet.tool)))
     depth = Depth(sheet.depth.astype(np.float32), np.ones(sheet.depth.shape, np.float32), "known")
     frames = Frames(sheet.rgb, np.zeros(len(sheet.rgb), np.uint8))
-    follow(frames, masks, depth, sheet.camera, parse(Tracking, {}, "tracking"))
+    surface = correspond(frames, masks, Correspondence())
+    follow(frames, masks, surface, depth, sheet.camera, parse(Tracking, {}, "tracking"))
     said = capsys.readouterr().err
     assert "the instrument from the right" in said
     assert re.search(r"--grasp \d+,\d+,\d+,[\d.]+,[\d.]+ ", said)

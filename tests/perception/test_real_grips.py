@@ -11,11 +11,13 @@ import pytest
 
 from surgisim.artifacts.depth import Depth
 from surgisim.config.base import parse
+from surgisim.config.correspondence import Correspondence
 from surgisim.config.ingest import Ingest
 from surgisim.config.masking import Masking
 from surgisim.config.tracking import Tracking
 from surgisim.perception.ingest.clip import ingest
 from surgisim.perception.masking.outline import masks
+from surgisim.perception.tracking.correspond import correspond
 from surgisim.perception.tracking.follow import follow
 from surgisim.proof.grasps import NEAR, SOON, compare
 
@@ -35,8 +37,10 @@ def test_a_real_grip_is_found_and_let_go_where_and_when_it_is(shared, name):
         shared / "data" / clip["recording"], parse(Ingest, settings, "ingest"), progress=silent
     )
     found = masks(frames, given, Masking(), progress=silent)
+    surface = correspond(frames, found, Correspondence())
     flat = np.full(found.tool.shape, 0.1, np.float32)
-    motion = follow(frames, found, Depth(flat, np.ones_like(flat), "known"), camera, parse(Tracking, {}, "tracking"))[1]
+    depth = Depth(flat, np.ones_like(flat), "known")
+    motion = follow(frames, found, surface, depth, camera, parse(Tracking, {}, "tracking"))[1]
     assert len(motion.radius) == len(clip["grips"])
     for row in compare(clip["grips"], motion, camera):
         assert row["away_px"] < NEAR, row

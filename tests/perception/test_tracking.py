@@ -7,13 +7,14 @@ from pulled_sheet import pull_sheet
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.masks import Masks
+from surgisim.config.correspondence import Correspondence
 from surgisim.config.tracking import Tracking
 from surgisim.perception.tracking import cotracker, flow_chain
+from surgisim.perception.tracking.correspond import between, correspond
 from surgisim.perception.tracking.follow import follow
 from surgisim.perception.tracking.points import spread_points
 from surgisim.perception.tracking.refine import Found, find, templates
 from surgisim.perception.tracking.spread import spread
-from surgisim.perception.tracking.warp import Warp
 from surgisim.problem import Problem
 
 
@@ -25,7 +26,8 @@ def sheet():
 @pytest.fixture(scope="module")
 def tracked(sheet):
     queries = spread_points(np.ones_like(sheet.tool[0]), 300)
-    paths = flow_chain.track(sheet.rgb, sheet.tool, np.zeros_like(sheet.tool), queries, settings=Tracking())
+    frames, masks, surface, *_ = _stage(sheet)
+    paths = flow_chain.track(frames.rgb, surface, masks.specular, queries, settings=Tracking())
     near = np.rint(queries).astype(int)
     # Between pixels the sheet's own motion is nearly linear.
     true = queries[:, None] + (sheet.position - sheet.position[0])[:, near[:, 1], near[:, 0]].swapaxes(0, 1)
@@ -106,7 +108,8 @@ def test_the_same_recording_gives_the_same_bytes(sheet):
     few = slice(0, 6)
     queries = np.array([[40.0, 40.0], [70.0, 60.0]])
     none = np.zeros_like(sheet.tool)[few]
-    a, b = (flow_chain.track(sheet.rgb[few], none, none, queries, settings=Tracking()) for _ in range(2))
+    surfaces = [between(sheet.rgb[few], none) for _ in range(2)]
+    a, b = (flow_chain.track(sheet.rgb[few], s, none, queries, settings=Tracking()) for s in surfaces)
     assert a.xy.tobytes() == b.xy.tobytes()
 
 
@@ -122,13 +125,14 @@ def test_a_network_is_asked_in_its_own_layout_and_a_missing_one_is_named(sheet, 
     torch.jit.script(Still()).save(str(tmp_path / "still.pt"))
     queries = np.array([[40.0, 30.0], [70.0, 40.0]])
     none = np.zeros_like(sheet.tool)
+    still = SimpleNamespace(hidden=none)
     settings = Tracking(backend="cotracker", weights=tmp_path / "still.pt")
-    paths = cotracker.track(sheet.rgb, none, none, queries, settings=settings)
+    paths = cotracker.track(sheet.rgb, still, none, queries, settings=settings)
     assert np.allclose(paths.xy, queries[:, None])
     assert paths.visible.all()
     for path in (None, tmp_path / "nowhere.pt"):
         with pytest.raises(Problem, match="flow_chain"):
-            cotracker.track(sheet.rgb, none, none, queries, settings=Tracking(weights=path))
+            cotracker.track(sheet.rgb, still, none, queries, settings=Tracking(weights=path))
 
 
 def _shown(sheet, true):
@@ -141,18 +145,18 @@ def _stage(sheet):
     frames = Frames(sheet.rgb, np.zeros(len(sheet.rgb), np.uint8))
     masks = Masks(sheet.tool, ~sheet.tool, np.zeros_like(sheet.tool), np.ones(len(sheet.tool), np.float32))
     depth = Depth(sheet.depth.astype(np.float32), np.ones(sheet.depth.shape, np.float32), "known")
-    return frames, masks, depth, sheet.camera
+    return frames, masks, correspond(frames, masks, Correspondence()), depth, sheet.camera
 
 
 def test_a_point_that_is_not_recognised_is_carried_on_from_where_it_was():
     queries = np.array([[10.0, 12.0], [20.0, 8.0]])
     x, y = np.meshgrid(np.arange(32.0), np.arange(24.0))
     place = np.stack([x + 3, y + 1], -1).astype(np.float32)
-    warp = Warp(place, np.ones((24, 32), bool), np.full((24, 32), 0.1, np.float32))
+    followed, error = np.ones((24, 32), bool), np.full((24, 32), 0.1, np.float32)
     nothing, last = np.zeros((24, 32), bool), np.array([[0.4, -0.2], [0.1, 0.3]])
     found = Found(np.array([[0.2, 0.0], [0.2, 0.0]]), np.array([0.1, 0.1]), np.array([0.9, 0.5]))
     patches = SimpleNamespace(queries=queries)
-    xy, visible, _, shift = flow_chain._place(patches, warp, found, nothing, last)
+    xy, visible, _, shift = flow_chain._place(patches, place, followed, error, found, nothing, last)
     assert visible.all()
     assert xy == pytest.approx(queries + (3, 1) + [[0.2, 0.0], [0.1, 0.3]], abs=1e-4)
     assert shift == pytest.approx(np.array([[0.2, 0.0], [0.1, 0.3]]))

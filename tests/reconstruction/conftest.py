@@ -7,6 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.correspondence import Correspondence
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.inpainted import Inpainted
@@ -19,6 +20,12 @@ T, H, W, Z, PUSH = 17, 32, 40, 0.05, 3.0
 def push(x, y, t):
     """How far the tissue resting at a pixel has moved to the right [px]."""
     return PUSH * np.sin(np.pi * t / (T - 1)) * np.exp(-((x - W / 2) ** 2 + (y - H / 2) ** 2) / (2 * 8.0**2))
+
+
+def unfollowed() -> Correspondence:
+    """Nothing is seen to go anywhere: only pictures tell."""
+    none = np.zeros((T, H, W), bool)
+    return Correspondence(np.zeros((T, H, W, 2), np.float16), none, np.ones((T, H, W), np.float16), none)
 
 
 @pytest.fixture(scope="session")
@@ -48,9 +55,18 @@ def clip():
         frames=Frames(seen, split),
         inpainted=Inpainted(clean, tool.astype(np.uint8)),
         masks=Masks(tool, ~tool, np.zeros_like(tool), np.ones(T, np.float32)),
+        correspondence=unfollowed(),
         depth=Depth(np.full((T, H, W), Z, np.float32), np.ones((T, H, W), np.float32), "known"),
         camera=Camera(W, H, 50.0, 50.0, (W - 1) / 2, (H - 1) / 2, 25.0, T, "known", "given", "x", [W, H], [0, 0, W, H]),
-        settings=Reconstruction(iterations=400, most_gaussians=900, knots=(6, 12), knots_in_depth=(2, 2), threads=1),
+        # Pictures alone need a longer coarse phase than where the surface was seen to go.
+        settings=Reconstruction(
+            iterations=400,
+            phases=(0.5, 0.7, 0.9),
+            most_gaussians=900,
+            knots=(6, 12),
+            knots_in_depth=(2, 2),
+            threads=1,
+        ),
     )
 
 
@@ -61,6 +77,6 @@ def fit(clip):
     from surgisim.gaussians.initialise import initialise
     from surgisim.gaussians.observations import observe
 
-    seen = observe(clip.frames, clip.inpainted, clip.masks, clip.depth, clip.settings)
+    seen = observe(clip.frames, clip.inpainted, clip.masks, clip.correspondence, clip.depth, clip.settings)
     start = initialise(clip.inpainted.rgb, clip.depth.z, clip.masks.tool, clip.masks.tissue, clip.camera, most=500)
     return Fit(start, seen, clip.camera, T, clip.settings)

@@ -28,7 +28,9 @@ def test_rates_fall_to_their_end():
 
 def test_an_instrument_that_was_not_painted_over_counts_nothing(clip):
     origin = np.zeros_like(clip.inpainted.origin)
-    seen = observe(clip.frames, replace(clip.inpainted, origin=origin), clip.masks, clip.depth, clip.settings)
+    seen = observe(
+        clip.frames, replace(clip.inpainted, origin=origin), clip.masks, clip.correspondence, clip.depth, clip.settings
+    )
     tool = torch.from_numpy(clip.masks.tool[seen.frame])
     assert tool.any()
     assert not seen.weight[tool].any()
@@ -38,14 +40,16 @@ def test_an_instrument_that_was_not_painted_over_counts_nothing(clip):
 def test_copied_and_invented_pixels_count_less(clip):
     origin = clip.inpainted.origin.copy()
     origin[5][origin[5] == 1] = 2
-    seen = observe(clip.frames, replace(clip.inpainted, origin=origin), clip.masks, clip.depth, clip.settings)
+    seen = observe(
+        clip.frames, replace(clip.inpainted, origin=origin), clip.masks, clip.correspondence, clip.depth, clip.settings
+    )
     painted = torch.from_numpy(origin[seen.frame])
     assert (seen.weight[painted == 1] == torch.tensor(clip.settings.weight_copied)).all()
     assert (seen.weight[painted == 2] == torch.tensor(clip.settings.weight_invented)).all()
 
 
 def test_held_out_frames_stay_outside_and_the_tail_comes_in(clip):
-    seen = observe(clip.frames, clip.inpainted, clip.masks, clip.depth, clip.settings)
+    seen = observe(clip.frames, clip.inpainted, clip.masks, clip.correspondence, clip.depth, clip.settings)
     assert sorted(seen.frame) == np.flatnonzero(clip.frames.split != 1).tolist()
     assert 2 in clip.frames.split[seen.frame]
 
@@ -54,7 +58,7 @@ def test_a_clip_whose_first_frame_is_held_out_is_refused(clip):
     split = clip.frames.split.copy()
     split[0] = 1
     with pytest.raises(Problem, match="frame 0"):
-        observe(replace(clip.frames, split=split), clip.inpainted, clip.masks, clip.depth, clip.settings)
+        observe(replace(clip.frames, split=split), clip.inpainted, clip.masks, clip.correspondence, clip.depth, clip.settings)
 
 
 def test_adam_steps_like_torch():

@@ -18,7 +18,7 @@ def done(clip):
 
 
 def parts(clip, **changed):
-    names = ("frames", "inpainted", "masks", "depth", "camera", "settings")
+    names = ("frames", "inpainted", "masks", "correspondence", "depth", "camera", "settings")
     return [changed.get(name, getattr(clip, name)) for name in names]
 
 
@@ -61,6 +61,23 @@ def test_the_planted_motion_is_recovered(clip, done):
     assert np.median(np.linalg.norm(moved(length - 1), axis=1)) < 0.1 * planted.max()
 
 
+def test_where_pictures_tell_nothing_the_field_goes_where_the_surface_was_seen_to_go(clip):
+    count, height, width = clip.depth.z.shape
+    blank = replace(clip.inpainted, rgb=np.full_like(clip.inpainted.rgb, 120))
+    y, x = np.mgrid[:height, :width]
+    right = np.stack([clip.push(x, y, t) for t in range(count)])
+    moved = np.stack([right, 0 * right], -1).astype(np.float16)
+    surface = replace(clip.correspondence, moved=moved, seen=~clip.correspondence.hidden, error=0 * clip.correspondence.error)
+    done = reconstruct(*parts(clip, inpainted=blank, correspondence=surface))
+    start = np.stack([x, y], -1)[4:-4:3, 4:-4:3].reshape(-1, 2).astype(float)
+    rest, field = clip.camera.lift(start, np.full(len(start), clip.z)), load_field(done.deformation)
+    for t in (4, 8, 13):
+        went = clip.camera.project(displace(rest, field, t / clip.camera.fps)) - start
+        planted = clip.push(start[:, 0], start[:, 1], t)
+        assert np.abs(went[:, 0] - planted).max() < 0.25 * planted.max()
+        assert np.abs(went[:, 1]).max() < 0.15 * planted.max()
+
+
 def test_held_out_frames_are_not_looked_at(clip, done):
     rng = np.random.default_rng(1)
     held = clip.frames.split == 1
@@ -78,6 +95,7 @@ def test_held_out_frames_are_not_looked_at(clip, done):
             frames=replace(clip.frames, rgb=other(clip.frames.rgb)),
             inpainted=replace(clip.inpainted, rgb=other(clip.inpainted.rgb), origin=other(clip.inpainted.origin)),
             masks=replace(clip.masks, tool=tool, tissue=~tool),
+            correspondence=replace(clip.correspondence, seen=clip.correspondence.seen | held[:, None, None]),
             depth=replace(clip.depth, z=clip.depth.z * np.where(held, 3, 1).astype(np.float32)[:, None, None]),
         )
     )
@@ -122,9 +140,9 @@ def test_the_trajectory_term_acts_every_other_iteration_of_its_phases(clip, fit,
         for settings in (clip.settings, calm):
             fit.settings = settings
             field, mean = fit.current_field(), fit.adam.tensors["mean"]
-            moved, _, _, grow = field(mean, 0.2)
+            moved, _, _, grow = field(mean, fit.seen.frame[4] / clip.camera.fps)
             radius = (fit.adam.tensors["scale"] + grow).exp()
-            values.append(fit.priors(phase, field, radius, moved, 0.2, iteration).item())
+            values.append(fit.priors(phase, field, radius, moved, 4, iteration).item())
         assert (values[0] > values[1]) == (phase.trajectory and iteration != 1)
 
 

@@ -22,7 +22,7 @@ def stage(name, settings, **paths):
 
 
 def test_the_two_stages_make_a_scene_and_a_body(clip, tmp_path):
-    reads = {n: tmp_path / f"{n}.npz" for n in ("frames", "inpainted", "masks", "depth")}
+    reads = {n: tmp_path / f"{n}.npz" for n in ("frames", "inpainted", "masks", "correspondence", "depth")}
     reads["camera"] = tmp_path / "camera.json"
     for name, path in reads.items():
         save(getattr(clip, name), path, producer="test", settings={}, code="")

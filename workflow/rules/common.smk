@@ -100,11 +100,12 @@ shell.prefix(
 )
 
 
-# The nine stages whose time and memory the tables show.
+# The ten stages whose time and memory the tables show.
 MEASURED = (
     "ingest",
     "masking",
     "inpainting",
+    "correspondence",
     "depth",
     "tracking",
     "reconstruction",

@@ -76,11 +76,36 @@ rule inpainting:
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
+rule correspondence:
+    input:
+        frames=upstream("ingest", "frames.npz"),
+        masks=upstream("masking", "masks.npz"),
+    output:
+        correspondence="results/{clip}/{variant}/correspondence/correspondence.npz",
+    log:
+        "logs/{clip}/{variant}/correspondence.log",
+    benchmark:
+        "benchmarks/{clip}/{variant}/correspondence.tsv"
+    conda:
+        "../../envs/perception.yaml"
+    threads: 4
+    resources:
+        mem_mb=3000,
+    params:
+        settings=settings("correspondence"),
+        code=code("correspondence"),
+    shell:
+        'python "$SURGISIM/stages/correspondence.py"'
+        " --frames {input.frames} --masks {input.masks} --correspondence {output.correspondence}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
 rule depth:
     input:
         frames=upstream("ingest", "frames.npz"),
         inpainted=upstream("inpainting", "inpainted.npz"),
         masks=upstream("masking", "masks.npz"),
+        correspondence=upstream("correspondence", "correspondence.npz"),
         given=upstream("ingest", "given.npz"),
         camera=upstream("ingest", "camera.json"),
     output:
@@ -100,8 +125,8 @@ rule depth:
         code=code("depth"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/depth.py"'
-        " --frames {input.frames} --inpainted {input.inpainted} --masks {input.masks} --given {input.given}"
-        " --camera {input.camera} --depth {output.depth}"
+        " --frames {input.frames} --inpainted {input.inpainted} --masks {input.masks}"
+        " --correspondence {input.correspondence} --given {input.given} --camera {input.camera} --depth {output.depth}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
@@ -109,6 +134,7 @@ rule tracking:
     input:
         frames=upstream("ingest", "frames.npz"),
         masks=upstream("masking", "masks.npz"),
+        correspondence=upstream("correspondence", "correspondence.npz"),
         depth=upstream("depth", "depth.npz"),
         camera=upstream("ingest", "camera.json"),
     output:
@@ -129,6 +155,6 @@ rule tracking:
         code=code("tracking"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/tracking.py"'
-        " --frames {input.frames} --masks {input.masks} --depth {input.depth}"
-        " --camera {input.camera} --tracks {output.tracks} --motion {output.motion}"
+        " --frames {input.frames} --masks {input.masks} --correspondence {input.correspondence}"
+        " --depth {input.depth} --camera {input.camera} --tracks {output.tracks} --motion {output.motion}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"

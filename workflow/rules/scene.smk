@@ -6,6 +6,7 @@ rule reconstruction:
         frames=upstream("ingest", "frames.npz"),
         inpainted=upstream("inpainting", "inpainted.npz"),
         masks=upstream("masking", "masks.npz"),
+        correspondence=upstream("correspondence", "correspondence.npz"),
         depth=upstream("depth", "depth.npz"),
         camera=upstream("ingest", "camera.json"),
     output:
@@ -28,7 +29,7 @@ rule reconstruction:
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/reconstruction.py"'
         " --frames {input.frames} --inpainted {input.inpainted} --masks {input.masks}"
-        " --depth {input.depth} --camera {input.camera}"
+        " --correspondence {input.correspondence} --depth {input.depth} --camera {input.camera}"
         " --scene {output.scene} --deformation {output.deformation} --rendered {output.rendered}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.correspondence import Correspondence
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.given import Given
@@ -26,6 +27,7 @@ def depth(
     frames: Frames,
     inpainted: Inpainted,
     masks: Masks,
+    surface: Correspondence,
     given_: Given,
     camera: Camera,
     settings: config.Depth,
@@ -34,11 +36,10 @@ def depth(
 ) -> Depth:
     """z of the tissue in every pixel, behind the instrument too."""
     rgb = inpainted.rgb
-    if not masks.tool.shape == rgb.shape[:3] == frames.rgb.shape[:3]:
-        raise Problem(
-            f"depth: masks are {masks.tool.shape}, frames {frames.rgb.shape[:3]} and inpainted frames {rgb.shape[:3]}; "
-            "pass those of one clip and size."
-        )
+    shapes = {"frames": frames.rgb.shape[:3], "masks": masks.tool.shape, "inpainted": rgb.shape[:3]}
+    shapes |= {"correspondence": surface.hidden.shape}
+    if len(set(shapes.values())) > 1:
+        raise Problem(f"depth: {shapes} are not of one clip (frames, height, width). Check which are passed.")
     hidden = masks.tool | (inpainted.origin != SEEN)
     name = choose(settings.backend, given_)
     if name == "given":
@@ -53,6 +54,7 @@ def depth(
             hidden,
             masks.specular,
             camera,
+            surface,
             distance=settings.distance,
             relief=settings.relief,
             size=settings.lattice,

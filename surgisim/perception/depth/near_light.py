@@ -19,13 +19,13 @@ import cv2
 import numpy as np
 
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.correspondence import Correspondence
 from surgisim.lighting.headlight import linear_light
 from surgisim.lighting.veil import ABOVE, veil_of
 from surgisim.perception.depth.pull import Watched, nearer
 from surgisim.perception.depth.shading import Lattice, explain, shading
 from surgisim.perception.grasp.outline import Outline
 from surgisim.perception.tracking.spread import spread
-from surgisim.perception.tracking.warp import Warp, follow_surface
 from surgisim.side_by_side import ahead, in_order
 
 TRUST = 0.5
@@ -57,6 +57,7 @@ def estimate(
     hidden: np.ndarray,
     specular: np.ndarray,
     camera: Camera,
+    surface: Correspondence,
     *,
     distance: float = 0.07,
     size: int = 64,
@@ -67,8 +68,9 @@ def estimate(
     """Depth [m] and confidence 0-1 of a recording without its instrument, (T, H, W) float32 each.
 
     rgb: sRGB, (T, H, W, 3) uint8. hidden: pixels whose colour is not the tissue's at that time, specular: highlights,
-    (T, H, W) bool. distance: median depth of frame 0 [m]. size: longer side of the lattice it is solved on [px].
-    relief: expected spread of log depth in frame 0 about its mean slope. tools: the instruments, as they are seen.
+    (T, H, W) bool. surface: where frame 0's pixels went. distance: median depth of frame 0 [m]. size: longer side of
+    the lattice it is solved on [px]. relief: expected spread of log depth in frame 0 about its mean slope. tools: the
+    instruments, as they are seen.
     """
     ratio = min(1.0, size / max(rgb.shape[1:3]))
     lattice = Lattice.of(camera, ratio)
@@ -80,8 +82,8 @@ def estimate(
     frames, watched = [], []
     looks = in_order(_read, ((f, h | s, lattice.shape, grey) for f, h, s in zip(rgb, hidden, specular, strict=True)))
     by_itself = ahead(_by_themselves(lattice, looks, rest - np.median(rest), relief))
-    for t, (warp, (now, alone)) in enumerate(zip(ahead(follow_surface(rgb, hidden)), by_itself, strict=True)):
-        position, sure = _placed(warp, lattice)
+    for t, (now, alone) in enumerate(by_itself):
+        position, sure = _placed(surface, t, lattice)
         frames.append((sure, now, alone))
         watched.append(_watch(lattice, position, sure, now))
         if progress:
@@ -109,11 +111,12 @@ def _by_themselves(lattice: Lattice, looks, alone: np.ndarray, relief: float) ->
         yield now, alone
 
 
-def _placed(warp: Warp, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
+def _placed(surface: Correspondence, frame: int, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
     """Where frame 0's lattice pixels are [lattice px], (h, w, 2), and how surely 0-1, (h, w)."""
-    sure = _shrink(warp.seen * np.exp(-((warp.error / 0.8) ** 2)), lattice.shape)
-    scale = np.array(lattice.shape[::-1]) / np.array(warp.seen.shape[::-1])
-    return (_shrink(warp.position, lattice.shape) + 0.5) * scale - 0.5, sure
+    seen, error = surface.seen[frame], surface.error[frame].astype(np.float32)
+    sure = _shrink(seen * np.exp(-((error / 0.8) ** 2)), lattice.shape)
+    scale = np.array(lattice.shape[::-1]) / np.array(seen.shape[::-1])
+    return (_shrink(surface.position(frame), lattice.shape) + 0.5) * scale - 0.5, sure
 
 
 def _watch(lattice: Lattice, position: np.ndarray, sure: np.ndarray, now) -> tuple[np.ndarray, ...]:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from surgisim.artifacts.correspondence import Correspondence
 from surgisim.config.tracking import Tracking
 from surgisim.perception.tracking import Paths
-from surgisim.perception.tracking.flow_chain import widen
 from surgisim.problem import Problem
 
 SIGMA = 0.5
@@ -24,7 +24,7 @@ ELSEWHERE = (
 
 def track(
     rgb: np.ndarray,
-    tool: np.ndarray,
+    surface: Correspondence,
     specular: np.ndarray,
     queries: np.ndarray,
     *,
@@ -48,11 +48,10 @@ def track(
             f"tracking: the network in {settings.weights} gives tracks {xy.shape}, visibility {seen.shape}; finite "
             f"{(*want, 2)} and {want} are wanted. {ELSEWHERE}"
         )
-    hidden = np.stack([widen(mask, max(1, round(settings.margin * max(mask.shape)))) for mask in tool])
     near = np.rint(xy).astype(int)
     inside = (near >= 0).all(-1) & (near[..., 0] < rgb.shape[2]) & (near[..., 1] < rgb.shape[1])
     x, y = np.where(inside, near[..., 0], 0), np.where(inside, near[..., 1], 0)
-    visible = seen & inside & ~hidden[np.arange(len(rgb)), y, x]
+    visible = seen & inside & ~surface.hidden[np.arange(len(rgb)), y, x]
     if progress:
         progress(1, 1, "points followed")
     return Paths(xy, visible, np.where(visible, SIGMA, 10 * SIGMA).astype(np.float32))

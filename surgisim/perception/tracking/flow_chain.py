@@ -1,8 +1,8 @@
 """Follow points by dense flow anchored to the first frame; needs no weights.
 
-Each point rides on the dense warp of the surface around it (warp.py) and is then set to a fraction of a pixel by its
-own patch of the first frame (refine.py). Where the patch is not recognised, the warp alone carries it on from where it
-last was, and its sigma says so.
+Each point rides on the surface around it (correspond.py) and is then set to a fraction of a pixel by its own patch of
+the first frame (refine.py). Where the patch is not recognised, the surface alone carries it on from where it last was,
+and its sigma says so.
 """
 
 from collections.abc import Callable
@@ -10,11 +10,12 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
+from surgisim.artifacts.correspondence import Correspondence
 from surgisim.config.tracking import Tracking
 from surgisim.perception.tracking import Paths
 from surgisim.perception.tracking.between import sample
+from surgisim.perception.tracking.correspond import widen
 from surgisim.perception.tracking.refine import Found, Templates, find, templates
-from surgisim.perception.tracking.warp import Warp, follow_surface
 from surgisim.side_by_side import in_order
 
 LIKE, STRANGE = 0.7, 0.2
@@ -23,7 +24,7 @@ LIKE, STRANGE = 0.7, 0.2
 
 def track(
     rgb: np.ndarray,
-    tool: np.ndarray,
+    surface: Correspondence,
     specular: np.ndarray,
     queries: np.ndarray,
     *,
@@ -32,46 +33,49 @@ def track(
 ) -> Paths:
     """Where `queries` of frame 0, (K, 2) [px], went.
 
-    rgb: sRGB, (T, H, W, 3) uint8. tool, specular: instrument and highlights, (T, H, W) bool.
+    rgb: sRGB, (T, H, W, 3) uint8. surface: where frame 0's pixels went. specular: highlights, (T, H, W) bool.
     """
     side = max(rgb.shape[1:3])
-    hidden = np.stack([widen(mask, max(1, round(settings.margin * side))) for mask in tool])
+    hidden = surface.hidden
     radius = int(np.clip(round(settings.patch * side), 4, 12))
     bright = hidden | np.stack([widen(mask, 1) for mask in specular])
     patches = templates(_grey(rgb[0]), queries, bright[0], radius=radius)
     rows, shift = [], np.zeros(queries.shape)
 
-    def seen(t: int, warp: Warp) -> tuple[Warp, Found]:
-        return warp, find(patches, _grey(rgb[t]), warp.position, bright[t])
+    def found_in(t: int) -> tuple[np.ndarray, Found]:
+        position = surface.position(t)
+        return position, find(patches, _grey(rgb[t]), position, bright[t])
 
-    surface = enumerate(follow_surface(rgb, hidden, progress=progress))
-    for t, (warp, found) in enumerate(in_order(seen, surface)):
-        *row, shift = _place(patches, warp, found, hidden[t], shift)
+    for t, (position, found) in enumerate(in_order(found_in, zip(range(len(rgb))))):
+        *row, shift = _place(patches, position, surface.seen[t], surface.error[t], found, hidden[t], shift)
         rows.append(row)
+        if progress:
+            progress(t + 1, len(rgb), "finding points by their patches")
     xy, visible, sigma = (np.stack(part, 1) for part in zip(*rows, strict=True))
     return Paths(xy.astype(np.float32), visible, sigma.astype(np.float32))
 
 
-def widen(mask: np.ndarray, by: int) -> np.ndarray:
-    """`mask` (H, W) grown by `by` px all round, bool."""
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * by + 1, 2 * by + 1))
-    return cv2.dilate(mask.astype(np.uint8), disc) > 0
-
-
 def _place(
-    patches: Templates, warp: Warp, found: Found, hidden: np.ndarray, last: np.ndarray
+    patches: Templates,
+    position: np.ndarray,
+    followed: np.ndarray,
+    error: np.ndarray,
+    found: Found,
+    hidden: np.ndarray,
+    last: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Where the points are, whether they are seen, how sure, and their shifts against the warp, (K, 2) [px].
+    """Where the points are, whether they are seen, how sure, and their shifts against the surface, (K, 2) [px].
 
-    last: their shifts in the frame before: what a warp has wrong in a place it has wrong in the next frame, too.
+    position, followed, error: of the surface, see `Correspondence`. last: the points' shifts in the frame before: what
+    the surface has wrong in a place it has wrong in the next frame, too.
     """
-    error = sample(warp.error, patches.queries[:, None])[:, 0]
-    seen = sample(warp.seen.astype(np.float32), patches.queries[:, None])[:, 0] > 0.5
+    error = sample(error, patches.queries[:, None])[:, 0]
+    seen = sample(followed.astype(np.float32), patches.queries[:, None])[:, 0] > 0.5
     far = np.linalg.norm(found.shift, axis=-1)
     known = (found.likeness > LIKE) & (found.sigma < 1.0) & (far < 1.0 + 3.0 * error)
     shift = np.where(known[:, None], found.shift, last)
     at = patches.queries + shift
-    xy = sample(warp.position, at[:, None])[:, 0]
+    xy = sample(position, at[:, None])[:, 0]
     height, width = hidden.shape
     inside = (xy >= 0).all(-1) & (xy[:, 0] <= width - 1) & (xy[:, 1] <= height - 1)
     covered = sample(hidden.astype(np.float32), xy[:, None])[:, 0] > 0.25

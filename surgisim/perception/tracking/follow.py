@@ -8,6 +8,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.correspondence import Correspondence
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.masks import Masks
@@ -37,6 +38,7 @@ SURE = 0.6
 def follow(
     frames: Frames,
     masks: Masks,
+    surface: Correspondence,
     depth: Depth,
     camera: Camera,
     settings: Tracking,
@@ -45,7 +47,8 @@ def follow(
 ) -> tuple[Tracks, Motion]:
     """Tissue tracks and the grasp of one recording."""
     rgb = frames.rgb
-    for name, shape in (("masks", masks.tool.shape), ("depth", depth.z.shape)):
+    shapes = {"masks": masks.tool.shape, "correspondence": surface.hidden.shape, "depth": depth.z.shape}
+    for name, shape in shapes.items():
         if shape != rgb.shape[:3]:
             raise Problem(f"tracking: {name} are {shape} and frames {rgb.shape[:3]}; pass files of one clip and size.")
     if not masks.tissue[0].any():
@@ -56,7 +59,7 @@ def follow(
     spread_count = max(DENSE, 2 * settings.points)
     queries = spread_points(everywhere, min(spread_count, everywhere.size // 4))
     cell = everywhere.size / len(queries)
-    paths = _backend(settings.backend)(rgb, masks.tool, masks.specular, queries, settings=settings, progress=progress)
+    paths = _backend(settings.backend)(rgb, surface, masks.specular, queries, settings=settings, progress=progress)
     source, side, seen = "given" if grips else "found", max(rgb.shape[1:3]), []
     flow = frame_flow(rgb) if masks.tool.any() and len(rgb) > 1 else None
     tools = instruments(masks.tool, lit(rgb)[0], flow) if flow is not None else []
