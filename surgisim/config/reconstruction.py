@@ -8,7 +8,7 @@ from surgisim.config.base import Settings
 
 
 class Reconstruction(Settings):
-    iterations: int = Field(5000, ge=10)
+    iterations: int = Field(3000, ge=10)
     """Optimisation steps, one frame each [1]."""
     phases: tuple[float, float, float] = (0.2, 0.5, 0.9)
     """Ends of the coarse phase, of the trajectory phase and of the field's refinement; from the last on the field is

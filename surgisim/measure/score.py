@@ -23,6 +23,7 @@ from surgisim.measure.groups.tracking import tracking
 from surgisim.measure.lpips import Lpips
 from surgisim.measure.number import measured
 from surgisim.measure.run import Run
+from surgisim.side_by_side import in_order
 
 
 def score(run: Run, *, lpips: Lpips | None, first: int, progress=lambda *_: None) -> dict[str, dict[str, Any]]:
@@ -40,8 +41,8 @@ def score(run: Run, *, lpips: Lpips | None, first: int, progress=lambda *_: None
         "physics": lambda: physics(run),
     }
     groups = {}
-    for done, (name, ask) in enumerate(asked.items()):
-        progress(done, len(asked), name)
-        groups[name] = ask()
-    progress(len(asked), len(asked), "measured")
+    progress(0, len(asked), "measuring")
+    for name, found in zip(asked, in_order(lambda ask: ask(), zip(asked.values())), strict=True):
+        groups[name] = found
+        progress(len(groups), len(asked), f"{name} measured")
     return measured(groups)

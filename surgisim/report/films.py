@@ -6,6 +6,7 @@ import numpy as np
 
 from surgisim.report.overlay import enlarged
 from surgisim.report.uri import data_uri, jpeg
+from surgisim.side_by_side import in_order
 from surgisim.video import mp4
 
 GAP = 8
@@ -27,7 +28,7 @@ class Film:
 
 def strip(panels: dict[str, np.ndarray], width: int, **more) -> Film:
     """Panels (T, H, W, 3) uint8 by caption, side by side, each `width` [px] wide; the rest as in `joined`."""
-    wide = [np.stack([enlarged(f, width) for f in frames]) for frames in panels.values()]
+    wide = [np.stack(list(in_order(enlarged, ((f, width) for f in frames)))) for frames in panels.values()]
     return joined(dict(zip(panels, wide, strict=True)), **more)
 
 

@@ -1,6 +1,7 @@
 """One run as one HTML file."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from importlib.resources import files
 
 import jinja2
@@ -23,19 +24,21 @@ from surgisim.side_by_side import in_order
 def page(story: Story, *, progress=lambda *_: None) -> bytes:
     """The report, UTF-8, with every picture and film inside."""
     width = story.settings.panel
-    progress(0, 5, "contact sheet")
-    content = {"story": story, "cards": headline(story), "doubts": distrust(story), "rows": contact(story)}
-    progress(1, 5, "films")
-    content["films"] = films(story)
-    progress(2, 5, "scene and body")
-    content["scene"] = scene_views(story.run.scene, story.run.camera, width)
-    content["body"] = body_views(story, (700, 600))
-    content["materials"] = material_views(story, (700, 600))
-    progress(4, 5, "curves and tables")
-    content["plots"] = plots(story)
-    content["parameters"] = parameters(story.run.physics, story.run.fit, story.metrics.values.get("physics", {}))
-    content["grids"], content["lists"] = grids(story.metrics), lists(story.metrics)
-    content["phase_colors"] = PHASE
+    with ThreadPoolExecutor(1) as beside:
+        progress(0, 5, "contact sheet")
+        strips = beside.submit(films, story)
+        content = {"story": story, "cards": headline(story), "doubts": distrust(story), "rows": contact(story)}
+        progress(1, 5, "scene and body")
+        content["scene"] = scene_views(story.run.scene, story.run.camera, width)
+        content["body"] = body_views(story, (700, 600))
+        content["materials"] = material_views(story, (700, 600))
+        progress(2, 5, "curves and tables")
+        content["plots"] = plots(story)
+        content["parameters"] = parameters(story.run.physics, story.run.fit, story.metrics.values.get("physics", {}))
+        content["grids"], content["lists"] = grids(story.metrics), lists(story.metrics)
+        content["phase_colors"] = PHASE
+        progress(4, 5, "films")
+        content["films"] = strips.result()
     text = template("report.html.j2").render(**content)
     progress(5, 5, "written")
     return text.encode()
@@ -52,7 +55,7 @@ def template(name: str) -> jinja2.Template:
 
 def films(story: Story) -> list[tuple[str, Film]]:
     """Title and film, in the order of the page."""
-    run, settings = story.run, story.settings
+    run, settings, masks = story.run, story.settings, story.run.masks
     whole = range(run.camera.frames)
     beside = {"recording": run.frames.rgb, "reconstruction": run.rendered.rgb}
     if story.replayed:
@@ -63,13 +66,12 @@ def films(story: Story) -> list[tuple[str, Film]]:
 
     def seen() -> dict[str, Sequence[np.ndarray]]:
         return {
-            "masks: instrument green, highlights orange": [
-                overlay.masks(run.frames.rgb[t], run.masks.tool[t], run.masks.specular[t], run.masks.tissue[t])
-                for t in whole
-            ],
+            "masks: instrument green, highlights orange": list(
+                in_order(overlay.masks, zip(run.frames.rgb, masks.tool, masks.specular, masks.tissue, strict=True))
+            ),
             "instrument taken out": run.inpainted.rgb,
-            "depth": [depth_picture(story, t, zoom) for t in whole],
-            "tracks and grasp": [tracked_picture(story, t, zoom) for t in whole],
+            "depth": list(in_order(depth_picture, ((story, t, zoom) for t in whole))),
+            "tracks and grasp": list(in_order(tracked_picture, ((story, t, zoom) for t in whole))),
         }
 
     box = (round(1.4 * settings.panel), settings.panel)

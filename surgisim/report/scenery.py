@@ -16,6 +16,7 @@ from surgisim.report.palette import HELD, MATERIAL, MOVED, gradient, mapped, rgb
 from surgisim.report.story import Story
 from surgisim.report.uri import jpeg
 from surgisim.report.views import View, balls, look
+from surgisim.side_by_side import in_order
 
 WHITE = (1.0, 1.0, 1.0)
 
@@ -126,7 +127,7 @@ def side_film(story: Story, size: tuple[int, int], **how) -> Film:
 
 
 def _frames(position: np.ndarray, color: np.ndarray, radius: float, view: View) -> np.ndarray:
-    return np.stack([balls(p, c, radius, view) for p, c in zip(position, color, strict=True)])
+    return np.stack(list(in_order(lambda p, c: balls(p, c, radius, view), zip(position, color, strict=True))))
 
 
 def _radius(story: Story) -> float:

@@ -58,7 +58,14 @@ def test_a_clip_whose_first_frame_is_held_out_is_refused(clip):
     split = clip.frames.split.copy()
     split[0] = 1
     with pytest.raises(Problem, match="frame 0"):
-        observe(replace(clip.frames, split=split), clip.inpainted, clip.masks, clip.correspondence, clip.depth, clip.settings)
+        observe(
+            replace(clip.frames, split=split),
+            clip.inpainted,
+            clip.masks,
+            clip.correspondence,
+            clip.depth,
+            clip.settings,
+        )
 
 
 def test_adam_steps_like_torch():

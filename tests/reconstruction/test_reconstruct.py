@@ -67,7 +67,9 @@ def test_where_pictures_tell_nothing_the_field_goes_where_the_surface_was_seen_t
     y, x = np.mgrid[:height, :width]
     right = np.stack([clip.push(x, y, t) for t in range(count)])
     moved = np.stack([right, 0 * right], -1).astype(np.float16)
-    surface = replace(clip.correspondence, moved=moved, seen=~clip.correspondence.hidden, error=0 * clip.correspondence.error)
+    surface = replace(
+        clip.correspondence, moved=moved, seen=~clip.correspondence.hidden, error=0 * clip.correspondence.error
+    )
     done = reconstruct(*parts(clip, inpainted=blank, correspondence=surface))
     start = np.stack([x, y], -1)[4:-4:3, 4:-4:3].reshape(-1, 2).astype(float)
     rest, field = clip.camera.lift(start, np.full(len(start), clip.z)), load_field(done.deformation)
