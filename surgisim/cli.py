@@ -100,9 +100,6 @@ def demo(
     camera = Phantom()
     # It knows its camera, as config/clips.tsv says of it; what is set by hand comes after, and counts.
     told = [] if any(s.startswith("phantom.") for s in set_ or ()) else [f"focal={camera.focal * camera.width:g}"]
-    if told and not config:
-        # More iterations make its small pictures, where they are held out, better by .1 dB.
-        told.append("reconstruction.iterations=2500")
     run(
         clip="phantom",
         name="demo",

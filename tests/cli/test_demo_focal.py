@@ -14,17 +14,11 @@ def asked(monkeypatch, *arguments):
 
 
 def test_the_embedded_clip_tells_its_focal_length(monkeypatch):
-    assert asked(monkeypatch) == ["focal=192", "reconstruction.iterations=2500"]
+    assert asked(monkeypatch) == ["focal=192"]
 
 
 def test_what_is_set_by_hand_comes_after(monkeypatch):
-    assert asked(monkeypatch, "--set", "focal=150") == ["focal=192", "reconstruction.iterations=2500", "focal=150"]
-
-
-def test_settings_of_ones_own_keep_their_iterations(monkeypatch, tmp_path):
-    own = tmp_path / "own.yaml"
-    own.write_text("reconstruction:\n  iterations: 800\n")
-    assert asked(monkeypatch, "--config", str(own)) == ["focal=192"]
+    assert asked(monkeypatch, "--set", "focal=150") == ["focal=192", "focal=150"]
 
 
 def test_another_camera_is_not_said_to_be_this_one(monkeypatch):

@@ -13,6 +13,7 @@ from scipy.special import expit
 
 from surgisim.deformation.field import displace, load_field
 from surgisim.measure.compared import OF_MOVING, from_start, moving
+from surgisim.measure.groups.depth_change import sampled
 from surgisim.measure.number import number, ranged
 from surgisim.measure.resample import ratio
 from surgisim.measure.run import Run
@@ -34,16 +35,20 @@ SPIKE = 4.0
 
 def scene_geometry(run: Run) -> dict[str, dict[str, Any]]:
     """Of the canonical scene and of where its field carries it."""
-    return _against_tracks(run) | _of_neighbours(run) | _at_rest(run)
+    numbers = _against(run, run.tracks.xy, run.tracks.visible, "motion", "tracks") | _of_neighbours(run) | _at_rest(run)
+    # The field is told where the surface was seen to go, by what tracks ride on: only the truth tells whether it is so.
+    if run.truth is not None:
+        numbers |= _against(run, run.truth.xy, run.truth.visible, "true_motion", "the truth")
+    return numbers
 
 
-def _against_tracks(run: Run) -> dict[str, dict[str, Any]]:
-    """Where the field carries tracked points, and where they were seen."""
-    tracks, camera, field = run.tracks, run.camera, load_field(run.deformation)
-    rest = tracks.xyz[:, 0].astype(float)
-    counted = tracks.visible & (tracks.visible[:, 0] & np.isfinite(rest).all(1))[:, None]
+def _against(run: Run, xy: np.ndarray, visible: np.ndarray, name: str, what: str) -> dict[str, dict[str, Any]]:
+    """Where the field carries points, and where they are: xy (K, T, 2) [px], visible (K, T)."""
+    camera, field = run.camera, load_field(run.deformation)
+    rest = camera.lift(xy[:, 0].astype(float), sampled(run.depth.z[:1].astype(float), xy[:, :1])[:, 0])
+    counted = visible & (visible[:, 0] & np.isfinite(rest).all(1))[:, None]
     counted[:, 0] = False
-    seen = from_start(tracks.xy)
+    seen = from_start(xy)
     counted &= moving(seen, counted, counted.any(1))
     known = counted.any(1)
     start, away = camera.project(rest[known]), np.zeros(counted.shape)
@@ -53,16 +58,20 @@ def _against_tracks(run: Run) -> dict[str, dict[str, Any]]:
     ours, still = (np.where(counted, d, 0).sum(1) for d in (away, np.linalg.norm(seen, axis=-1)))
     of = f"{OF_MOVING}, all frames in which they are seen, in the picture"
     words = {
-        "motion": (
+        name: (
             ratio(ours, counted.sum(1)),
             "px",
-            f"mean distance of where the field carries points from tracks, {of}",
+            f"mean distance of where the field carries points from {what}, {of}",
         ),
-        "motion_still": (ratio(still, counted.sum(1)), "px", f"the same of a scene that stands still: {of}"),
-        "motion_share": (ratio(ours, still), "%", f"distance from tracks as a share of that of a still scene: {of}"),
+        f"{name}_still": (ratio(still, counted.sum(1)), "px", f"the same of a scene that stands still: {of}"),
+        f"{name}_share": (
+            ratio(ours, still),
+            "%",
+            f"distance from {what} as a share of that of a still scene: {of}",
+        ),
     }
     return {
-        name: ranged(found, unit, how, factor=100 if unit == "%" else 1, why_not="no moving point is tracked")
+        name: ranged(found, unit, how, factor=100 if unit == "%" else 1, why_not="no moving point is seen")
         for name, (found, unit, how) in words.items()
     }
 
