@@ -24,16 +24,6 @@ def in_order(work: Callable[..., Any], items: Iterable[tuple]) -> Iterator[Any]:
             yield waiting.popleft().result()
 
 
-def ahead(items: Iterable[Any], count: int = 4) -> Iterator[Any]:
-    """The same items, each worked out on a thread of its own while those before it are used, `count` ahead at most."""
-    each, end = iter(items), object()
-    with ThreadPoolExecutor(1) as pool:
-        waiting = deque(pool.submit(next, each, end) for _ in range(count))
-        while (item := waiting.popleft().result()) is not end:
-            waiting.append(pool.submit(next, each, end))
-            yield item
-
-
 def threads() -> int:
     """As OMP_NUM_THREADS says (its first number), which Snakemake sets for each job; else one for each processor."""
     told = os.environ.get("OMP_NUM_THREADS", "").split(",")[0]

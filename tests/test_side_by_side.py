@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from surgisim.perception.flow import dense_flow
-from surgisim.side_by_side import ahead, in_order
+from surgisim.side_by_side import in_order
 
 
 @pytest.mark.parametrize("count", ["1", "3,2"])
@@ -28,24 +28,6 @@ def test_an_error_in_one_frame_stops_the_whole(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     with pytest.raises(ZeroDivisionError):
         list(in_order(lambda n: 1 // (n - 3), ((n,) for n in range(9))))
-
-
-def test_what_is_worked_out_ahead_comes_whole_and_an_error_in_it_is_raised_where_it_is_used():
-    asked = []
-
-    def items():
-        for n in range(9):
-            asked.append(n)
-            yield n
-        raise ZeroDivisionError
-
-    taken = ahead(items(), 3)
-    assert next(taken) == 0
-    assert len(asked) <= 5
-    with pytest.raises(ZeroDivisionError):
-        list(taken)
-    assert asked == list(range(9))
-    assert list(ahead([])) == []
 
 
 def test_flow_is_the_same_side_by_side_and_opencvs_threads_never_change(monkeypatch):

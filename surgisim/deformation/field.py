@@ -149,7 +149,8 @@ def load_field(deformation: Deformation) -> Field:
 def deform(scene: Scene, field: Field, time: float) -> Scene:
     """The canonical scene as it is at `time` [s]; at 0 it is itself."""
     with torch.no_grad():
-        moved, opacity, turn, grow = (a.numpy() for a in field(torch.from_numpy(scene.mean), time))
+        mean = torch.from_numpy(scene.mean).to(field.planes.device)
+        moved, opacity, turn, grow = (a.cpu().numpy() for a in field(mean, time))
     rotation = scene.rotation + turn
     return Scene(
         mean=scene.mean + moved,

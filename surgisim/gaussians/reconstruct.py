@@ -76,7 +76,8 @@ def reconstruct(
         fit = Fit(start, seen, camera, len(frames.rgb), settings)
         history = fit.run(progress)
         scene, field, tint = fit.result()
-        rgb = np.stack([picture(scene, field, tint, camera, t, settings.device) for t in range(len(frames.rgb))])
+        there = field.on(torch.device(settings.device))
+        rgb = np.stack([picture(scene, there, tint, camera, t, settings.device) for t in range(len(frames.rgb))])
     return Reconstructed(scene, save_field(field, tint, history), Frames(rgb, frames.split))
 
 

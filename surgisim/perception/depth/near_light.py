@@ -26,7 +26,7 @@ from surgisim.perception.depth.pull import Watched, nearer
 from surgisim.perception.depth.shading import Lattice, explain, shading
 from surgisim.perception.grasp.outline import Outline
 from surgisim.perception.tracking.spread import spread
-from surgisim.side_by_side import ahead, in_order
+from surgisim.side_by_side import in_order
 
 TRUST = 0.5
 """Confidence of a well explained pixel: brightness tells changes well and shapes only roughly."""
@@ -34,6 +34,8 @@ ALBEDO, HUE = 0.25, 0.3
 """Spread of log albedo that hue does not explain; of the hue's coefficients."""
 TURNS = 20
 """How often shape and albedo take turns: where tissue lies steep, six left a sixth of the slope unfound."""
+STRETCH, AFRESH = 16, 3
+"""Frames whose shapes by themselves are begun from one another; turns of the first of them, begun from frame 0's."""
 FIRST_DETAIL = 0.6
 """Finest wave of shape that is believed, as a share of the longer image side."""
 
@@ -80,9 +82,10 @@ def estimate(
     rest += np.log(distance) - np.median(rest[known > 0.5] if (known > 0.5).any() else rest)
     albedo = light + shading(lattice, rest)
     frames, watched = [], []
-    looks = in_order(_read, ((f, h | s, lattice.shape, grey) for f, h, s in zip(rgb, hidden, specular, strict=True)))
-    by_itself = ahead(_by_themselves(lattice, looks, rest - np.median(rest), relief))
-    for t, (now, alone) in enumerate(by_itself):
+    asked = ((f, h | s, lattice.shape, grey) for f, h, s in zip(rgb, hidden, specular, strict=True))
+    looks = list(in_order(_read, asked))
+    by_itself = _by_themselves(lattice, looks, rest - np.median(rest), relief)
+    for t, (now, alone) in enumerate(zip(looks, by_itself, strict=True)):
         position, sure = _placed(surface, t, lattice)
         frames.append((sure, now, alone))
         watched.append(_watch(lattice, position, sure, now))
@@ -104,11 +107,18 @@ def estimate(
     return np.stack(z).astype(np.float32), np.stack(confidence).astype(np.float32)
 
 
-def _by_themselves(lattice: Lattice, looks, alone: np.ndarray, relief: float) -> Iterator[tuple]:
-    """What `_read` has of each frame, and the log depth that it suggests by itself, begun from that of the last."""
-    for t, now in enumerate(looks):
-        alone = _first(lattice, *now, relief, begin=alone, turns=1) if t else alone
-        yield now, alone
+def _by_themselves(lattice: Lattice, looks: list[tuple], first: np.ndarray, relief: float) -> Iterator[np.ndarray]:
+    """The log depth that each frame suggests by itself, begun from that of the last; stretches of them side by side."""
+
+    def stretch(begin: int) -> list[np.ndarray]:
+        found = []
+        for t in range(begin, min(begin + STRETCH, len(looks))):
+            last, turns = (found[-1], 1) if found else (first, AFRESH)
+            found.append(_first(lattice, *looks[t], relief, begin=last, turns=turns) if t else first)
+        return found
+
+    for part in in_order(stretch, zip(range(0, len(looks), STRETCH))):
+        yield from part
 
 
 def _placed(surface: Correspondence, frame: int, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
