@@ -58,10 +58,11 @@ def clip():
         correspondence=unfollowed(),
         depth=Depth(np.full((T, H, W), Z, np.float32), np.ones((T, H, W), np.float32), "known"),
         camera=Camera(W, H, 50.0, 50.0, (W - 1) / 2, (H - 1) / 2, 25.0, T, "known", "given", "x", [W, H], [0, 0, W, H]),
-        # Pictures alone need a longer coarse phase than where the surface was seen to go.
+        # Pictures alone need a longer coarse phase and less of the trajectory term.
         settings=Reconstruction(
             iterations=400,
             phases=(0.5, 0.7, 0.9),
+            trajectory=0.5,
             most_gaussians=900,
             knots=(6, 12),
             knots_in_depth=(2, 2),
