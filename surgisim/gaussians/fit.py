@@ -187,7 +187,7 @@ class Fit:
         return total
 
     def astray(self, moved: torch.Tensor, u: int) -> torch.Tensor:
-        """How far the field carries Gaussians past where the surface was seen to go; the scene at rest is left be."""
+        """How far the field carries Gaussians past where the surface was seen to go; the scene at rest stays."""
         rest = self.adam.tensors["mean"].detach()
         start = pixels(rest, self.camera)
         height, width = self.seen.sure.shape[1:]

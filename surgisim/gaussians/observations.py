@@ -80,5 +80,6 @@ def observe(
         z=torch.from_numpy(depth.z[used].astype(np.float32)),
         trust=torch.from_numpy(trust),
         went=torch.from_numpy(surface.moved[used]),
-        sure=torch.from_numpy(surface.seen[used] / (1 + surface.error[used] ** 2)),
+        # An error of over 256 px has no square in half precision.
+        sure=torch.from_numpy(surface.seen[used] / (1 + surface.error[used].astype(np.float32) ** 2)).half(),
     )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from surgisim.gaussians.losses import anisotropic, masked_l1, total_variation, trajectory
+from surgisim.gaussians.losses import anisotropic, followed, masked_l1, total_variation, trajectory
 from surgisim.gaussians.neighbours import groups, nearest
 from surgisim.problem import Problem
 
@@ -25,6 +25,19 @@ def test_what_is_too_large_or_too_thin_costs_its_excess():
     thin = torch.tensor([[0.5, 0.1, 0.2]], dtype=torch.float64)
     assert float(anisotropic(thin, unit=1.0)) == pytest.approx(2)
     assert float(anisotropic(thin, unit=0.1, r_m=2.0)) == pytest.approx(3 + 2)
+
+
+def test_points_are_asked_to_be_where_they_were_seen_and_only_as_far_as_that_is_sure():
+    went = torch.tensor([[3.0, 0.0], [0.0, -4.0], [50.0, 50.0]], dtype=torch.float64)
+    moved = torch.tensor([[3.0, 0.0], [6.0, 4.0], [0.0, 0.0]], dtype=torch.float64, requires_grad=True)
+    sure = torch.tensor([1.0, 0.5, 0.0], dtype=torch.float64)
+    loss = followed(moved, went, sure, unit=2.0, soft=1e-6)
+    assert loss.item() == pytest.approx(0.5 * 5 / 1.5)
+    loss.backward()
+    assert moved.grad[1].numpy() == pytest.approx(np.array([0.6, 0.8]) / 2 * 0.5 / 1.5)
+    assert not moved.grad[[0, 2]].any()
+    assert torch.autograd.gradcheck(lambda m: followed(m, went, sure, unit=2.0), (moved + 0.3,))
+    assert float(followed(moved, went, 0 * sure, unit=2.0)) == 0
 
 
 def test_the_trajectory_term_is_the_sum_over_all_pairs():
