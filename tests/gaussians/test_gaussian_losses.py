@@ -37,7 +37,7 @@ def test_points_are_asked_to_be_where_they_were_seen_and_only_as_far_as_that_is_
     assert moved.grad[1].numpy() == pytest.approx(np.array([0.6, 0.8]) / 2 * 0.5 / 1.5)
     assert not moved.grad[[0, 2]].any()
     assert torch.autograd.gradcheck(lambda m: followed(m, went, sure, unit=2.0), (moved + 0.3,))
-    assert float(followed(moved, went, 0 * sure, unit=2.0)) == 0
+    assert followed(moved, went, 0 * sure, unit=2.0).item() == 0
 
 
 def test_the_trajectory_term_is_the_sum_over_all_pairs():
