@@ -19,10 +19,12 @@ class Deformation(Artifact):
     """Lower corner of the space-time box: x, y, z [m], t [s], (4,)."""
     high: np.ndarray
     """Upper corner, (4,)."""
+    moments: np.ndarray
+    """When the frames were taken that were looked at, (M,)."""
     tint: np.ndarray
-    """What is added to each Gaussian's colour at knots evenly through the clip, none at its first moment, sRGB 0-1,
+    """What is added to each Gaussian's colour at knots spread evenly over those frames, none at the first, sRGB 0-1,
     (K, G, 3) float16; see surgisim.gaussians.tint."""
     history: np.ndarray
     """Iteration, loss, PSNR [dB] on used frames, Gaussians, phase, (R, 5) float32."""
 
-    UNITS = {"low": "m, m, m, s", "high": "m, m, m, s"}
+    UNITS = {"low": "m, m, m, s", "high": "m, m, m, s", "moments": "s"}

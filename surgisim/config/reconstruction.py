@@ -1,6 +1,6 @@
 """Settings of the canonical scene and its deformation field."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -9,7 +9,9 @@ from surgisim.config.base import Settings
 
 class Reconstruction(Settings):
     iterations: int = Field(3000, ge=10)
-    """Optimisation steps, one frame each [1]."""
+    """Optimisation steps [1]."""
+    frames_per_step: int = Field(1, ge=1)
+    """Frames that a step looks at; a GPU takes hardly longer for a few than for one [1]."""
     phases: tuple[float, float, float] = (0.2, 0.5, 0.9)
     """Ends of the coarse phase, of the trajectory phase and of the field's refinement; from the last on the field is
     frozen and the canonical scene refined [fraction of iterations]."""
@@ -49,6 +51,9 @@ class Reconstruction(Settings):
     correspondence: float = Field(0.1, ge=0)
     """Weight of how far the field carries Gaussians past where the surface was seen to go, 0 switches it off; of
     errors counted in 1 % of the longest image side [1]."""
+    midway: float = Field(0.01, ge=0)
+    """Weight of how far Gaussians are from half way in frames that are not looked at, 0 switches it off; counted in
+    median first radii [1]."""
     anisotropy: float = Field(1.0, ge=0)
     """Weight of the anisotropic term, 0 switches it off [1]."""
     anisotropy_largest: float = Field(1.0, gt=0)
@@ -62,12 +67,16 @@ class Reconstruction(Settings):
     the texture is wide [1]."""
     pooled_sizes: tuple[float, ...] = (0.025, 0.075)
     """Sides of the blocks [longest image side]."""
+    squared: float = Field(4.0, ge=0)
+    """Weight of the squared colour misfit beside the absolute one, of colours 0-1: few pixels that are far off, such as
+    highlights, are what PSNR counts [1]."""
     depth: float = Field(0.5, ge=0)
     """Weight of the depth misfit [1/median depth]."""
     tint: float = Field(0.01, ge=0)
     """Weight of how far colours change in time: what motion explains is left to it [1]."""
-    knots_of_tint: float = Field(0.3, gt=0)
-    """Moments at which they may have changed [1/frame]."""
+    knots_of_tint: tuple[Annotated[float, Field(gt=0)], ...] = Field((0.1, 0.3, 1.0), min_length=1)
+    """Moments at which they may have changed, one number a scale; what the first scales leave the last tell
+    [1/frame]."""
     smoothness_space: float = Field(0.002, ge=0)
     """Weight of the planes' squared differences in space [1]."""
     smoothness_time: float = Field(0.005, ge=0)

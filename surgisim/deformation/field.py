@@ -8,6 +8,7 @@ adds dS without saying in which scale; the logarithm keeps radii positive.
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -48,19 +49,33 @@ class Field:
 
         At the box's first moment nothing has moved, whatever the weights are.
         """
-        if self.clock(time) <= 0:
-            count = len(mean)
-            return tuple(mean.new_zeros(n) for n in ((count, 3), count, (count, 4), (count, 3)))
-        where, clock = self.inside(mean), self.clock(time)
+        return tuple(change[0] for change in self.at(mean, [time]))
+
+    def at(self, mean: torch.Tensor, times: Sequence[float]) -> tuple[torch.Tensor, ...]:
+        """The same at B times, with B in front: dmu (B, G, 3), do (B, G), dR (B, G, 4), dS (B, G, 3)."""
+        clocks = [self.clock(time) for time in times]
+        later = [clock for clock in clocks if clock > 0]
+        changes = self._changes(mean, later) if later else ()
+        if len(later) == len(clocks):
+            return changes
+        count = len(mean)
+        still = tuple(mean.new_zeros(n) for n in ((count, 3), count, (count, 4), (count, 3)))
+        moved = zip(*changes, strict=True)
+        each = [next(moved) if clock > 0 else still for clock in clocks]
+        return tuple(map(torch.stack, zip(*each, strict=True)))
+
+    def _changes(self, mean: torch.Tensor, clocks: Sequence[float]) -> tuple[torch.Tensor, ...]:
+        """The same at these moments of the box, 0-1, none of them the first."""
+        where = self.inside(mean)
         if self.sheets:
-            x = self.sheets.features(self.planes, where, clock)
+            x = self.sheets.features(self.planes, where, clocks)
         else:
-            x = features(self.planes, where, clock, self.layout)
+            x = torch.stack([features(self.planes, where, clock, self.layout) for clock in clocks])
         for weight in self.head[:-1]:
             # Not a ReLU: its slope at 0, where every feature starts, is 0, and nothing would ever move.
             x = torch.nn.functional.silu(torch.nn.functional.linear(x, weight))
-        moved, opacity, turn, grow = torch.nn.functional.linear(x, self.head[-1]).split(OUTPUTS, 1)
-        return moved * self.reach, opacity[:, 0], turn, grow
+        moved, opacity, turn, grow = torch.nn.functional.linear(x, self.head[-1]).split(OUTPUTS, -1)
+        return moved * self.reach, opacity[..., 0], turn, grow
 
     def roughness(self) -> tuple[torch.Tensor, torch.Tensor]:
         """How far the planes are from smooth in space and in time, see `smoothness`."""
@@ -108,9 +123,9 @@ def still_field(
     return Field(layout, np.asarray(low, float), np.asarray(high, float), torch.ones(layout.count), head)
 
 
-def save_field(field: Field, tint: np.ndarray, history: np.ndarray) -> Deformation:
-    """The field as an artifact; tint: what is added to the colours at each knot (K, G, 3); history: one row a report
-    (R, 5)."""
+def save_field(field: Field, moments: np.ndarray, tint: np.ndarray, history: np.ndarray) -> Deformation:
+    """The field as an artifact; moments: those of the frames that were looked at [s], (M,); tint: what is added to the
+    colours at each knot (K, G, 3); history: one row a report (R, 5)."""
     layout = {
         "planes": ["xy", "xz", "yz", "tx", "ty", "tz"],
         "sizes": field.layout.sizes.tolist(),
@@ -123,6 +138,7 @@ def save_field(field: Field, tint: np.ndarray, history: np.ndarray) -> Deformati
         layout=json.dumps(layout, sort_keys=True),
         low=field.low.astype(np.float32),
         high=field.high.astype(np.float32),
+        moments=moments.astype(np.float32),
         tint=tint.astype(np.float16),
         history=np.asarray(history, np.float32).reshape(-1, 5),
     )

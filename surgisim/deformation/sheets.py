@@ -6,6 +6,7 @@
 Numbers outside of a plane's corner count for nothing. See `planes` for the equations.
 """
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -47,15 +48,17 @@ class Sheets:
             self.layout.plane(flat, scale, index).copy_(sheet[:, :h, :w].permute(1, 2, 0))
         return flat
 
-    def features(self, sheets: torch.Tensor, where: torch.Tensor, time: float) -> torch.Tensor:
-        """Feature of every point at one time, (G, L C), as `planes.features` of all planes end to end."""
+    def features(self, sheets: torch.Tensor, where: torch.Tensor, clocks: Sequence[float]) -> torch.Tensor:
+        """Feature of every point at each of B times, (B, G, L C), as `planes.features` of all planes end to end."""
         at = where.clamp(0, 1).T
-        clock = torch.stack([torch.full_like(at, min(max(time, 0.0), 1.0)), torch.zeros_like(at)], -1).flatten(1)
+        # Each point lies there at those times and, beside that, at the start.
+        times = [min(max(clock, 0.0), 1.0) for clock in clocks] + [0.0]
+        clock = torch.stack([torch.full_like(at, time) for time in times], -1).flatten(1)
         space = self._read(sheets[: self.spatial], at[DOWN], at[ACROSS], 0)
-        moved = self._read(sheets[self.spatial :], clock, at.repeat_interleave(2, 1), 1)
-        # Each point lies there now, and beside it at the start.
-        found = space * (moved[..., 0::2] - moved[..., 1::2])
-        return found.permute(2, 0, 1).flatten(1)
+        moved = self._read(sheets[self.spatial :], clock, at.repeat_interleave(len(times), 1), 1)
+        moved = moved.unflatten(-1, (-1, len(times)))
+        found = space[..., None] * (moved[..., :-1] - moved[..., -1:])
+        return found.permute(3, 2, 0, 1).flatten(2)
 
     def roughness(self, sheets: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """L_space and L_time, as `smoothness.roughness` of all planes end to end."""

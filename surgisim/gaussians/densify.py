@@ -26,17 +26,15 @@ class Record:
     """Sum of the projected centres' gradient lengths [1/px], (G,)."""
     shown: torch.Tensor
     """Largest sum of weights in any image [px], (G,)."""
-    images: int = 0
 
     @classmethod
     def empty(cls, count: int, device: torch.device | str = "cpu") -> "Record":
         return cls(torch.zeros(count, device=device), torch.zeros(count, device=device))
 
     def add(self, pull: torch.Tensor, shown: torch.Tensor) -> None:
-        """Take in one image."""
-        self.pull += pull.norm(dim=1)
-        self.shown = torch.maximum(self.shown, shown)
-        self.images += 1
+        """Take in B images: the projected centres' gradients [1/px], (B, G, 2), and weights [px], (B, G)."""
+        self.pull += pull.norm(dim=-1).sum(0)
+        self.shown = torch.maximum(self.shown, shown.amax(0))
 
 
 def renew(adam: Adam, record: Record, most: int, share: float, widest: float, beside: Sequence[str] = ()) -> int:

@@ -30,7 +30,8 @@ def rasterise(
     near: float,
     weigh: bool = True,
 ) -> tuple[torch.Tensor, ...]:
-    """rgb, depth, alpha, weight; see surgisim.gaussians.rasterise."""
+    """rgb, depth, alpha, weight; see surgisim.gaussians.rasterise. Several sets of Gaussians, (B, G, ...), are drawn at
+    once."""
     missing = lacking()
     if missing:
         raise Problem(f"rasterise: engine gsplat needs {missing}, which this machine lacks. Use engine numba.")
@@ -40,15 +41,15 @@ def rasterise(
                 f"rasterise: engine gsplat wants float32 on a CUDA device and was given {tensor.dtype} on "
                 f"{tensor.device}."
             )
-    if len(mean) == 0:
+    if mean.shape[-2] == 0:
         # gsplat's kernels end the process when there is nothing to draw.
-        nothing = mean.new_zeros(camera.height, camera.width) + color.sum()
-        return nothing[..., None] + mean.new_tensor(background), nothing, nothing, mean.new_zeros(0)
+        nothing = mean.new_zeros(*mean.shape[:-2], camera.height, camera.width) + color.sum()
+        return nothing[..., None] + mean.new_tensor(background), nothing, nothing, mean.new_zeros(mean.shape[:-1])
     attributes = mean, rotation, scale, opacity
     image, alpha, facts = _draw(*attributes, color, camera, background, near, "RGB+D")
     if probe.requires_grad and facts["means2d"].requires_grad:
-        facts["means2d"].register_hook(lambda gradient: _add_gradient(probe, gradient.reshape(-1, 2)))
-    weight = _weight(*attributes, camera, near) if weigh else mean.new_zeros(len(mean))
+        facts["means2d"].register_hook(lambda gradient: _add_gradient(probe, gradient.reshape(probe.shape)))
+    weight = _weight(*attributes, camera, near) if weigh else mean.new_zeros(mean.shape[:-1])
     return image[..., :3], image[..., 3], alpha, weight
 
 
@@ -98,22 +99,27 @@ def lacking() -> str:
 def _draw(mean, rotation, scale, opacity, color, camera, background, near, mode):
     from gsplat import rasterization
 
+    sets = mean.shape[:-2]
+    there = (a.expand(*sets, *a.shape) for a in (*_views(camera, mean.device), _constant((background,), mean.device)))
+    view, lens, behind = there
     image, alpha, facts = rasterization(
         mean,
         rotation,
         scale,
         opacity,
         color,
-        *_views(camera, mean.device),
+        view,
+        lens,
         camera.width,
         camera.height,
         near_plane=near,
         eps2d=LOW_PASS,
         packed=False,
-        backgrounds=_constant((background,), mean.device),
+        backgrounds=behind,
         render_mode=mode,
     )
-    return image[0], alpha[0, ..., 0], facts
+    # One camera, before height, width and channels.
+    return image.squeeze(-4), alpha.squeeze(-4)[..., 0], facts
 
 
 def _views(camera: Camera, device: torch.device) -> tuple[torch.Tensor, torch.Tensor]:
@@ -136,11 +142,11 @@ def _constant(numbers: tuple, device: torch.device) -> torch.Tensor:
 def _weight(mean, rotation, scale, opacity, camera, near):
     """Sum of w over all pixels: the gradient of a picture of ones with respect to their colour."""
     with torch.enable_grad():
-        one = torch.ones_like(mean[:, :1], requires_grad=True)
+        one = torch.ones_like(mean[..., :1], requires_grad=True)
         fixed = (t.detach() for t in (mean, rotation, scale, opacity))
         image, _, _ = _draw(*fixed, one, camera, (0.0,), near, "RGB")
         (weight,) = torch.autograd.grad(image.sum(), one)
-    return weight[:, 0]
+    return weight[..., 0]
 
 
 def _add_gradient(probe, gradient):

@@ -1,6 +1,6 @@
-"""The optimisation of scene and field, one frame at a time."""
+"""The optimisation of scene and field, a frame or a few at a time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from surgisim.gaussians.neighbours import groups
 from surgisim.gaussians.observations import Observations
 from surgisim.gaussians.rasterise import Image, engine_on, rasterise
 from surgisim.gaussians.schedule import Phase, phase_at, rate_at
-from surgisim.gaussians.tint import knots, tint
+from surgisim.gaussians.tint import clock, knots, tint
 from surgisim.problem import Problem
 
 RENEWALS = (0.1, 0.2, 0.3, 0.4)
@@ -33,6 +33,8 @@ field once more."""
 WEIGHED_EVERY = 2
 """Iterations from one to the next that tells a GPU's engine what each Gaussian adds to the picture, for which it draws
 that once more."""
+MIDWAY_EVERY = 8
+"""Iterations from one to the next that looks at a frame of which nothing is seen."""
 REPORTS = 100
 """Rows of the history."""
 
@@ -46,13 +48,19 @@ class Fit:
         self.device = torch.device(settings.device)
         self.seen, self.camera, self.settings = seen.on(self.device), camera, settings
         self.rng = np.random.default_rng(settings.seed)
+        self.moments = seen.frame / camera.fps
+        self.unseen = np.setdiff1d(np.arange(seen.frame[-1]), seen.frame) / camera.fps
         self.field = first_field(start.mean, camera, length, settings, self.rng).on(self.device)
         self.radius = float(np.exp(np.median(start.scale)))
         self.most = min(settings.most_gaussians, int(settings.growth * len(start.mean)))
         self.middle = float(np.median(start.mean[:, 2]))
         self.head = [f"head_{i}" for i in range(len(self.field.head))]
         tensors = {name: torch.from_numpy(getattr(start, name)).to(self.device) for name in ATTRIBUTES}
-        self.tint = [f"tint_{k}" for k in range(knots(settings.knots_of_tint, length))]
+        self.tints = [
+            [f"tint_{scale}_{k}" for k in range(knots(often, len(seen.frame)))]
+            for scale, often in enumerate(settings.knots_of_tint)
+        ]
+        self.tint = [name for names in self.tints for name in names]
         tensors |= {"planes": self.field.planes} | dict(zip(self.head, self.field.head, strict=True))
         tensors |= {name: torch.zeros_like(tensors["color"]) for name in self.tint}
         rates = {name: getattr(settings, f"rate_{name}") for name in (*ATTRIBUTES, "planes")}
@@ -60,23 +68,20 @@ class Fit:
         self.adam = Adam(tensors, rates | {"mean": settings.rate_mean * self.field.reach})
         self.groups: torch.Tensor | None = None
         self.record = Record.empty(len(start.mean), self.device)
+        self.order: list[int] = []
 
     def run(self, progress: Say) -> np.ndarray:
         """All iterations; returns the history, (R, 5)."""
         total = self.settings.iterations
         renewals = {round(share * total) for share in RENEWALS}
         every = max(total // REPORTS, 1)
-        order, history, rows, steps = [], [], [], []
+        history, rows, steps = [], [], []
         for i in range(total):
             phase = phase_at(i, total, self.settings.phases)
-            if not order:
-                order = self.rng.permutation(len(self.seen.frame)).tolist()
             if i in renewals:
                 self.renew()
-            # Frame 0 is the rest scene: seen no oftener than others, the scene would settle where it is on average.
-            anchor = self.settings.rest_every and i % self.settings.rest_every == 0
-            u = 0 if anchor else order.pop()
-            steps.append((i, u, self.step(phase, u, i)))
+            frames = self.next_frames(i)
+            steps.append((i, frames, self.step(phase, frames, i)))
             reports = (i + 1) % every == 0 or i == total - 1
             # A GPU that is asked after every step waits for each.
             if reports or self.device.type == "cpu":
@@ -91,111 +96,157 @@ class Fit:
                 rows = []
         return np.array(history, np.float32)
 
-    def finite(self, steps: list[tuple[int, int, torch.Tensor]]) -> list[list[float]]:
-        """What `step` gave at each iteration for each of the seen frames, as numbers; raises Problem for the first that
-        is none."""
+    def next_frames(self, iteration: int) -> list[int]:
+        """Which of the seen frames an iteration looks at."""
+        # Frame 0 is the rest scene: seen no oftener than others, the scene would settle where it is on average.
+        rest = self.settings.rest_every and iteration % self.settings.rest_every == 0
+        frames = [0] if rest else []
+        while len(frames) < self.settings.frames_per_step:
+            if not self.order:
+                self.order = self.rng.permutation(len(self.seen.frame)).tolist()
+            frames.append(self.order.pop())
+        return frames
+
+    def finite(self, steps: list[tuple[int, list[int], torch.Tensor]]) -> list[list[float]]:
+        """What `step` gave at each iteration for these frames, as numbers; raises Problem for the first that is
+        none."""
         values = torch.stack([value for *_, value in steps]).tolist()
-        for (iteration, u, _), (loss, _) in zip(steps, values, strict=True):
+        for (iteration, frames, _), (loss, _) in zip(steps, values, strict=True):
             if not np.isfinite(loss):
+                named = ", ".join(str(self.seen.frame[u]) for u in frames)
                 raise Problem(
-                    f"reconstruction: the loss is not finite at iteration {iteration}, frame {self.seen.frame[u]}. "
+                    f"reconstruction: the loss is not finite at iteration {iteration}, frame {named}. "
                     "Lower the step sizes (rate_mean, rate_planes, rate_head)."
                 )
         return values
 
-    def step(self, phase: Phase, u: int, iteration: int) -> torch.Tensor:
-        """One frame's loss, its gradients, one step; the loss and the mean squared error on seen tissue, (2,)."""
+    def step(self, phase: Phase, frames: Sequence[int], iteration: int) -> torch.Tensor:
+        """The loss in these of the seen frames, its gradients, one step; the loss and the mean squared error on seen
+        tissue, (2,)."""
         adam = self.adam
         canonical = ATTRIBUTES if phase.moves_canonical else ()
         shown = self.tint if phase.recolours else ()
         adam.watch((*canonical, *shown, "planes", *self.head) if phase.moves_field else (*canonical, *shown))
-        time = self.seen.frame[u] / self.camera.fps
+        times = [self.seen.frame[u] / self.camera.fps for u in frames]
         field = self.current_field()
-        mean = adam.tensors["mean"]
-        moved, opacity, turn, grow = field(mean, time)
-        added = tint([adam.tensors[name] for name in shown], field.clock(time)) if shown else 0.0
+        mean, color = adam.tensors["mean"], adam.tensors["color"]
+        moved, opacity, turn, grow = field.at(mean, times)
+        added = (
+            torch.stack([self.added(clock(time, self.moments)) for time in times]) if shown else torch.zeros_like(moved)
+        )
         radius = (adam.tensors["scale"] + grow).exp()
         recorded = iteration < RENEWALS[-1] * self.settings.iterations
         on_cpu = self.device.type == "cpu"
-        probe = torch.zeros(len(mean), 2, device=self.device, requires_grad=recorded)
+        probe = torch.zeros(*moved.shape[:2], 2, device=self.device, requires_grad=recorded)
         image = rasterise(
             mean + moved,
             adam.tensors["rotation"] + turn,
             radius,
             torch.sigmoid(adam.tensors["opacity"] + opacity),
-            adam.tensors["color"] + added,
+            color + added,
             self.camera,
             engine=engine_on(self.device),
             probe=probe,
             weigh=recorded and (on_cpu or iteration % WEIGHED_EVERY == 0),
             checked=on_cpu,
         )
-        loss = self.misfit(phase, image, u) + self.priors(phase, field, radius, moved, u, iteration)
-        if self.settings.tint and torch.is_tensor(added):
+        seen = self.seen.of(frames)
+        loss = self.misfit(phase, image, seen) + self.priors(phase, field, radius, moved, seen, iteration)
+        if shown and self.settings.tint:
             loss = loss + self.settings.tint * added.abs().mean()
         loss.backward()
-        if phase.moves_field and time == 0:
+        if phase.moves_field and not any(times):
             # The rest scene says nothing of the head: its slope is zero, and its moments decay as ever.
             for name in self.head:
                 adam.tensors[name].grad = torch.zeros_like(adam.tensors[name])
         adam.advance(rate_at(iteration, self.settings.iterations, self.settings.rate_end))
         if recorded:
             self.record.add(probe.grad, image.weight)
-        whole = self.seen.weight[u] == 1
-        wrong = (image.rgb.detach() - self.seen.rgb[u]).square().mean(-1)
+        whole = seen.weight == 1
+        wrong = (image.rgb.detach() - seen.rgb).square().mean(-1)
         error = (wrong * whole).sum() / whole.sum().clamp(min=1)
         return torch.stack([loss.detach(), error])
 
-    def misfit(self, phase: Phase, image: Image, u: int) -> torch.Tensor:
-        """Colour and depth of one frame against what was seen."""
-        seen, settings = self.seen, self.settings
-        weight = (seen.weight if phase.recolours else seen.texture)[u]
-        color = masked_l1(image.rgb, seen.rgb[u], weight)
+    def added(self, gone: float) -> torch.Tensor:
+        """What is added to the colours then, sRGB 0-1, (G, 3); 0 at the first moment."""
+        nothing = torch.zeros_like(self.adam.tensors["color"])
+        return sum((tint([self.adam.tensors[name] for name in names], gone) for names in self.tints), nothing)
+
+    def misfit(self, phase: Phase, image: Image, seen: Observations) -> torch.Tensor:
+        """Colour and depth of some frames against what was seen."""
+        settings = self.settings
+        weight = seen.weight if phase.recolours else seen.texture
+        wrong = (image.rgb - seen.rgb) * weight[..., None]
+        color = masked_l1(image.rgb, seen.rgb, weight)
+        if settings.squared:
+            color = color + settings.squared * (wrong * (image.rgb - seen.rgb)).sum() / (3 * weight.sum()).clamp(min=1)
         if phase.number == 1 and settings.pooled:
-            wrong = ((image.rgb - seen.rgb[u]) * weight[..., None]).permute(2, 0, 1)[None]
             for share in settings.pooled_sizes:
                 block = max(round(share * max(seen.z.shape[1:])), 1)
-                color = color + settings.pooled * avg_pool2d(wrong, block, max(block // 2, 1)).abs().mean()
+                blurred = avg_pool2d(wrong.permute(0, 3, 1, 2), block, max(block // 2, 1))
+                color = color + settings.pooled * blurred.abs().mean()
         # sum w (z_i - z), so that a surface that is not yet opaque is not pushed away to make up for it.
-        depth = masked_l1(image.depth / self.middle, seen.z[u] / self.middle * image.alpha, seen.trust[u])
+        depth = masked_l1(image.depth / self.middle, seen.z / self.middle * image.alpha, seen.trust)
         return color + settings.depth * depth
 
     def priors(
-        self, phase: Phase, field: Field, radius: torch.Tensor, moved: torch.Tensor, u: int, iteration: int
+        self, phase: Phase, field: Field, radius: torch.Tensor, moved: torch.Tensor, seen: Observations, iteration: int
     ) -> torch.Tensor:
         """What is asked of scene and field besides the picture."""
-        settings, time = self.settings, self.seen.frame[u] / self.camera.fps
+        settings, times = self.settings, seen.frame / self.camera.fps
         total = radius.new_zeros(())
         if settings.anisotropy:
             unit = settings.anisotropy_unit * self.radius
             limits = {"r_m": settings.anisotropy_largest, "r_ani": settings.anisotropy_ratio}
-            total = total + settings.anisotropy * anisotropic(radius, unit=unit, **limits)
-        if phase.trajectory and settings.trajectory and time > 0 and iteration % TRAJECTORY_EVERY == 0:
+            total = total + settings.anisotropy * anisotropic(radius.flatten(0, 1), unit=unit, **limits)
+        if not times.any():
+            return total + (self.smoothness(field) if phase.moves_field else 0.0)
+        if phase.trajectory and settings.trajectory and iteration % TRAJECTORY_EVERY == 0:
             if self.groups is None:
                 points = self.adam.tensors["mean"].detach().cpu().numpy()
                 self.groups = torch.from_numpy(groups(points, settings.neighbours)).to(self.device)
-            before = field(self.adam.tensors["mean"], time - 1 / self.camera.fps)[0]
+            # One of several frames tells as well as all: it asks for the field once more.
+            k = int(times.argmax())
+            before = field(self.adam.tensors["mean"], times[k] - 1 / self.camera.fps)[0]
             literal = settings.trajectory_form == "literal"
             total = total + TRAJECTORY_EVERY * settings.trajectory * trajectory(
-                (moved - before) / self.radius, self.groups, literal=literal
+                (moved[k] - before) / self.radius, self.groups, literal=literal
             )
         if phase.moves_field:
-            space, rough = field.roughness()
-            total = total + settings.smoothness_space * space + settings.smoothness_time * rough
-        if phase.moves_field and settings.correspondence and time > 0:
-            total = total + settings.correspondence * self.astray(moved, u)
+            total = total + self.smoothness(field)
+        if phase.moves_field and settings.correspondence:
+            total = total + settings.correspondence * self.astray(moved, seen)
+        if phase.moves_field and settings.midway and len(self.unseen) and iteration % MIDWAY_EVERY == 0:
+            total = total + MIDWAY_EVERY * settings.midway * self.off_midway(field, iteration // MIDWAY_EVERY)
         return total
 
-    def astray(self, moved: torch.Tensor, u: int) -> torch.Tensor:
+    def off_midway(self, field: Field, turn: int) -> torch.Tensor:
+        """How far Gaussians are from half way between the two frames beside one that is not looked at, each of which has
+        its turn [median first radius]."""
+        time = self.unseen[turn % len(self.unseen)]
+        k = int(np.searchsorted(self.moments, time))
+        before, after = self.moments[k - 1], self.moments[k]
+        mean, share = self.adam.tensors["mean"].detach(), (time - before) / (after - before)
+        with torch.no_grad():
+            first, last = field.at(mean, [before, after])[0]
+        return (field(mean, time)[0] - torch.lerp(first, last, share)).norm(dim=1).mean() / self.radius
+
+    def smoothness(self, field: Field) -> torch.Tensor:
+        """What is asked of the planes alone."""
+        space, rough = field.roughness()
+        return self.settings.smoothness_space * space + self.settings.smoothness_time * rough
+
+    def astray(self, moved: torch.Tensor, seen: Observations) -> torch.Tensor:
         """How far the field carries Gaussians past where the surface was seen to go; the scene at rest stays."""
         rest = self.adam.tensors["mean"].detach()
         start = pixels(rest, self.camera)
-        height, width = self.seen.sure.shape[1:]
+        height, width = seen.sure.shape[1:]
         column, row = start.round().long().unbind(1)
         inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
-        place = row.clamp(0, height - 1), column.clamp(0, width - 1)
-        went, sure = self.seen.went[u][place].float(), self.seen.sure[u][place].float() * inside
-        return followed(pixels(rest + moved, self.camera) - start, went, sure, unit=0.01 * max(height, width))
+        row, column = row.clamp(0, height - 1), column.clamp(0, width - 1)
+        went, sure = seen.went[:, row, column].float(), seen.sure[:, row, column].float() * inside
+        gone = pixels(rest + moved, self.camera) - start
+        return followed(gone.flatten(0, 1), went.flatten(0, 1), sure.flatten(), unit=0.01 * max(height, width))
 
     def renew(self) -> None:
         """Drop and split Gaussians."""
@@ -213,14 +264,15 @@ class Fit:
         self.adam.watch(())
         arrays = {name: self.adam.tensors[name].cpu().numpy().copy() for name in ATTRIBUTES}
         arrays["rotation"] /= np.linalg.norm(arrays["rotation"], axis=1, keepdims=True)
-        at_knots = np.stack([self.adam.tensors[name].cpu().numpy() for name in self.tint])
+        count = max(map(len, self.tints))
+        at_knots = np.stack([self.added((k + 1) / count).cpu().numpy() for k in range(count)])
         return Scene(**arrays), self.current_field().on(torch.device("cpu")), at_knots
 
 
 def pixels(points: torch.Tensor, camera: Camera) -> torch.Tensor:
-    """Pixels of points, camera frame [m], (G, 3) -> [px], (G, 2)."""
-    x, y, z = points.unbind(1)
-    return torch.stack([camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy], 1)
+    """Pixels of points, camera frame [m], (..., 3) -> [px], (..., 2)."""
+    x, y, z = points.unbind(-1)
+    return torch.stack([camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy], -1)
 
 
 def first_field(

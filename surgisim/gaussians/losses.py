@@ -12,13 +12,13 @@ TINY = 1e-20
 
 
 def masked_l1(value: torch.Tensor, target: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
-    """Mean of |value - target| where `mask` (H, W) is true (or weighted, 0-1); 0 when it is nowhere.
+    """Mean of |value - target| where `mask` (..., H, W) is true (or weighted, 0-1); 0 when it is nowhere.
 
-    value, target: (H, W) or (H, W, C), in one unit, which is the result's too.
+    value, target: (..., H, W) or (..., H, W, C), in one unit, which is the result's too.
     """
     weight = mask.to(value.dtype)
-    channels = value[0, 0].numel()
-    total = (weight.reshape(*mask.shape, *[1] * (value.ndim - 2)) * (value - target).abs()).sum()
+    channels = value.numel() // mask.numel()
+    total = (weight.reshape(*mask.shape, *[1] * (value.ndim - mask.ndim)) * (value - target).abs()).sum()
     return total / (weight.sum() * channels).clamp(min=TINY)
 
 

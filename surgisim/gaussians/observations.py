@@ -3,6 +3,7 @@
 Frames held out between used ones are left out here, at the door: nothing behind it can see them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,8 @@ from surgisim.artifacts.inpainted import COPIED, INVENTED, SEEN, Inpainted
 from surgisim.artifacts.masks import Masks
 from surgisim.config.reconstruction import Reconstruction
 from surgisim.problem import Problem
+
+SEEN_IN_EACH = "rgb", "weight", "texture", "z", "trust", "went", "sure"
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,13 @@ class Observations:
 
     def on(self, device: torch.device) -> "Observations":
         """The same, on this device."""
-        names = "rgb", "weight", "texture", "z", "trust", "went", "sure"
-        return Observations(frame=self.frame, **{name: getattr(self, name).to(device) for name in names})
+        return Observations(self.frame, **{name: getattr(self, name).to(device) for name in SEEN_IN_EACH})
+
+    def of(self, frames: Sequence[int]) -> "Observations":
+        """These of the U frames, which may be named twice."""
+        # Rows are stacked one by one: an index would have to be brought to a GPU, which waits for it.
+        rows = {name: torch.stack([getattr(self, name)[u] for u in frames]) for name in SEEN_IN_EACH}
+        return Observations(self.frame[list(frames)], **rows)
 
 
 def observe(

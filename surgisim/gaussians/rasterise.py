@@ -63,6 +63,8 @@ def rasterise(
     weigh       whether `weight` is asked for: gsplat draws once more for it, and leaves it 0 where it is not
     checked     whether values are looked at first, which waits for all that a GPU still does
 
+    All but the camera may have B in front, for as many sets of Gaussians; the image has it too.
+
     Raises Problem for shapes that do not fit, values that are not finite, opacities outside 0-1, and a missing
     CUDA engine.
     """
@@ -70,7 +72,7 @@ def rasterise(
     _check(attributes, checked)
     back = (0.0, 0.0, 0.0) if background is None else tuple(float(b) for b in background)
     if probe is None:
-        probe = mean.new_zeros((len(mean), 2))
+        probe = mean.new_zeros((*mean.shape[:-1], 2))
     if engine == "numba":
         from surgisim.gaussians.engine_numba import rasterise as draw
     elif engine == "gsplat":
@@ -81,7 +83,11 @@ def rasterise(
         from surgisim.gaussians.twin import rasterise as draw
     else:
         raise Problem(f"rasterise: engine is '{engine}', and there are numba, gsplat and twin.")
-    return Image(*draw(mean, rotation, scale, opacity, color, probe, camera, back, near))
+    tensors = mean, rotation, scale, opacity, color, probe
+    if mean.ndim == 2 or engine == "gsplat":
+        return Image(*draw(*tensors, camera, back, near))
+    each = [draw(*one, camera, back, near) for one in zip(*tensors, strict=True)]
+    return Image(*map(torch.stack, zip(*each, strict=True)))
 
 
 def engine_on(device: torch.device) -> Engine:
@@ -135,24 +141,32 @@ def to_bytes(rgb: np.ndarray) -> np.ndarray:
 
 
 def _check(attributes: dict[str, torch.Tensor], values: bool) -> None:
-    g = len(attributes["mean"])
-    wanted = {"mean": (g, 3), "rotation": (g, 4), "scale": (g, 3), "opacity": (g,), "color": (g, 3)}
+    *sets, g = attributes["mean"].shape[:-1]
+    wanted = {"mean": (3,), "rotation": (4,), "scale": (3,), "opacity": (), "color": (3,)}
     for name, tensor in attributes.items():
-        if tuple(tensor.shape) != wanted[name]:
-            raise Problem(f"rasterise: {name} has shape {tuple(tensor.shape)}, and {wanted[name]} is wanted.")
+        shape = (*sets, g, *wanted[name])
+        if tuple(tensor.shape) != shape:
+            raise Problem(f"rasterise: {name} has shape {tuple(tensor.shape)}, and {shape} is wanted.")
     if not (g and values):
         return
     given = {name: tensor.detach() for name, tensor in attributes.items()}
     # A sum is not finite as soon as one value is not, and costs a fifth of testing each; all are asked for at once,
     # because a GPU has done nothing else by the time it answers.
     range_of = given["opacity"].aminmax()
-    turned = given["rotation"].abs().amax(1).amin()
+    turned = given["rotation"].abs().amax(-1).amin()
     *sums, low, high, turned = torch.stack([*(t.sum() for t in given.values()), *range_of, turned]).tolist()
     for (name, tensor), total in zip(given.items(), sums, strict=True):
-        bad = [] if math.isfinite(total) else (~torch.isfinite(tensor).reshape(g, -1).all(1)).nonzero().ravel()
+        bad = [] if math.isfinite(total) else _bad(tensor, len(sets))
         if len(bad):
             raise Problem(f"rasterise: {name} is not finite for {len(bad)} of {g} Gaussians, first {int(bad[0])}.")
     if low < 0 or high > 1:
         raise Problem(f"rasterise: opacity runs from {low:g} to {high:g}, and 0 to 1 is wanted.")
     if not turned:
         raise Problem("rasterise: a rotation is 0, 0, 0, 0, which turns nothing anywhere.")
+
+
+def _bad(tensor: torch.Tensor, sets: int) -> torch.Tensor:
+    """Which Gaussians have a value that is not finite in any of the sets, (N,)."""
+    fine = torch.isfinite(tensor)
+    fine = fine.all(0) if sets else fine
+    return (~fine.reshape(len(fine), -1).all(1)).nonzero().ravel()

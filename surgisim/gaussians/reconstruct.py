@@ -27,7 +27,7 @@ from surgisim.gaussians.fit import Fit, Say
 from surgisim.gaussians.initialise import initialise
 from surgisim.gaussians.observations import observe
 from surgisim.gaussians.rasterise import render, to_bytes
-from surgisim.gaussians.tint import tinted
+from surgisim.gaussians.tint import clock, tinted
 from surgisim.problem import Problem
 
 
@@ -77,8 +77,14 @@ def reconstruct(
         history = fit.run(progress)
         scene, field, tint = fit.result()
         there = field.on(torch.device(settings.device))
-        rgb = np.stack([picture(scene, there, tint, camera, t, settings.device) for t in range(len(frames.rgb))])
-    return Reconstructed(scene, save_field(field, tint, history), Frames(rgb, frames.split))
+        gone = [clock(t / camera.fps, fit.moments) for t in range(len(frames.rgb))]
+        rgb = np.stack(
+            [
+                picture(scene, there, camera, t, tinted(scene.color, tint, gone[t]), settings.device)
+                for t in range(len(gone))
+            ]
+        )
+    return Reconstructed(scene, save_field(field, fit.moments, tint, history), Frames(rgb, frames.split))
 
 
 @contextmanager
@@ -95,10 +101,8 @@ def threads(count: int) -> Iterator[None]:
 
 
 def picture(
-    scene: Scene, field: Field, tint: np.ndarray, camera: Camera, frame: int, device: str = "cpu"
+    scene: Scene, field: Field, camera: Camera, frame: int, color: np.ndarray, device: str = "cpu"
 ) -> np.ndarray:
-    """A frame of the clip, re-rendered, sRGB 0-255, (H, W, 3) uint8; tint: of the colours at each knot, (K, G, 3)."""
-    time = frame / camera.fps
-    moved = deform(scene, field, time)
-    moved = replace(moved, color=tinted(scene.color, tint, field.clock(time)))
+    """A frame of the clip, re-rendered, sRGB 0-255, (H, W, 3) uint8; color: the Gaussians' then, sRGB 0-1, (G, 3)."""
+    moved = replace(deform(scene, field, frame / camera.fps), color=color)
     return to_bytes(render(*drawn(moved), camera, device=device).rgb)

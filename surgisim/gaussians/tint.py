@@ -2,7 +2,8 @@
 
     c_i(t) = c_i + sum_k h_k(t) w_ik
 
-h_k are hat functions at K knots, evenly spread over the clip; there is none at its first moment, whose colours are the
+h_k are hat functions at K knots, spread evenly over the frames that are looked at: none lies where no frame tells its
+colours, so what is between two frames is between their colours. There is none at the first, whose colours are the
 scene's own. A lamp at the camera lights tissue otherwise as it turns and comes nearer, and its highlights stay where
 they are while tissue passes under them. The paper's field changes no colour: there motion has to make up for it.
 """
@@ -13,24 +14,29 @@ import numpy as np
 import torch
 
 
+def clock(time: float, moments: np.ndarray) -> float:
+    """How many of the frames that are looked at have gone by, 0-1; moments: when they were taken [s], (M,)."""
+    return float(np.interp(time, moments, np.linspace(0.0, 1.0, len(moments))))
+
+
 def knots(often: float, frames: int) -> int:
     """How many there are at so many a frame."""
     return max(1, round(often * (frames - 1)))
 
 
-def shares(clock: float, count: int) -> dict[int, float]:
-    """Which of `count` knots tell of a moment, 0-1 through the clip, and the share of each; none at the first."""
-    at = min(max(clock, 0.0), 1.0) * count
+def shares(gone: float, count: int) -> dict[int, float]:
+    """Which of `count` knots tell of a moment, 0-1 of the frames, and the share of each; none at the first."""
+    at = min(max(gone, 0.0), 1.0) * count
     last = min(int(at), count - 1)
     told = {last - 1: 1.0 - (at - last), last: at - last}
     return {k: share for k, share in told.items() if k >= 0 and share > 0}
 
 
-def tint(at_knots: Sequence[torch.Tensor], clock: float) -> torch.Tensor | float:
+def tint(at_knots: Sequence[torch.Tensor], gone: float) -> torch.Tensor | float:
     """What is added to the colours, sRGB 0-1, (G, 3), of what it is at K knots; 0 at the first moment."""
-    return sum((share * at_knots[k] for k, share in shares(clock, len(at_knots)).items()), 0.0)
+    return sum((share * at_knots[k] for k, share in shares(gone, len(at_knots)).items()), 0.0)
 
 
-def tinted(color: np.ndarray, at_knots: np.ndarray, clock: float) -> np.ndarray:
+def tinted(color: np.ndarray, at_knots: np.ndarray, gone: float) -> np.ndarray:
     """Colours, sRGB 0-1, (G, 3), as they are then; at_knots: what is added at each knot, (K, G, 3)."""
-    return color + sum((np.float32(share) * at_knots[k] for k, share in shares(clock, len(at_knots)).items()), 0.0)
+    return color + sum((np.float32(share) * at_knots[k] for k, share in shares(gone, len(at_knots)).items()), 0.0)

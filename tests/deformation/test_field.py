@@ -61,14 +61,22 @@ def test_points_move_with_the_gaussians_at_their_place(moving, scene):
 
 
 def test_a_stored_field_moves_like_the_one_it_was(moving, scene):
-    again = load_field(save_field(moving, np.zeros((1, 4, 3)), np.zeros((2, 5))))
+    again = load_field(save_field(moving, np.zeros(1), np.zeros((1, 4, 3)), np.zeros((2, 5))))
     assert np.allclose(deform(scene, again, 0.4).mean, deform(scene, moving, 0.4).mean, atol=1e-6)
 
 
 def test_a_field_whose_layout_does_not_fit_is_refused(moving):
-    stored = save_field(moving, np.zeros((1, 4, 3)), np.zeros((2, 5)))
+    stored = save_field(moving, np.zeros(1), np.zeros((1, 4, 3)), np.zeros((2, 5)))
     with pytest.raises(Problem, match="announces"):
         load_field(replace(stored, planes=stored.planes[:-1]))
+
+
+def test_several_times_at_once_are_those_times(moving, scene):
+    mean, times = torch.from_numpy(scene.mean), [0.3, 0.0, 0.9, 0.3]
+    for several, each in zip(moving.at(mean, times), zip(*(moving(mean, t) for t in times), strict=True), strict=True):
+        torch.testing.assert_close(several, torch.stack(each), rtol=1e-5, atol=1e-6)
+    assert moving.at(mean, times)[0][0].abs().max() > 0
+    assert moving.at(mean, times)[0][1].abs().max() == 0
 
 
 def test_planes_that_change_evenly_in_time_are_smooth_there(still):

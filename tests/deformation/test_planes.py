@@ -91,13 +91,14 @@ def test_sheets_hold_the_planes_and_are_read_and_smoothed_as_they_are(planes):
     where = torch.cat([where, where * 3 - 1])
     sheets = Sheets(layout, flat)
     torch.testing.assert_close(sheets.unpack(sheets.pack(flat)), flat, rtol=0, atol=0)
-    slope = torch.tensor(np.random.default_rng(1).standard_normal((80, layout.features)))
-    for time in (0.0, 0.37, 1.0):
+    for times in ([0.0], [0.37], [1.0], [0.2, 0.0, 0.9]):
+        slope = torch.tensor(np.random.default_rng(1).standard_normal((len(times), 80, layout.features)))
         a, b = flat.clone().requires_grad_(), where.clone().requires_grad_()
-        value, (space, later) = features(a, b, time, layout), roughness(a, layout)
+        value = torch.stack([features(a, b, time, layout) for time in times])
+        space, later = roughness(a, layout)
         ((value * slope).sum() + 2 * space + 3 * later).backward()
         c, d = sheets.pack(flat).requires_grad_(), where.clone().requires_grad_()
-        mine, (space, later) = sheets.features(c, d, time), sheets.roughness(c)
+        mine, (space, later) = sheets.features(c, d, times), sheets.roughness(c)
         ((mine * slope).sum() + 2 * space + 3 * later).backward()
         for found, wanted in ((mine, value), (sheets.unpack(c.grad), a.grad), (d.grad, b.grad)):
             torch.testing.assert_close(found, wanted, rtol=1e-10, atol=1e-12)

@@ -122,9 +122,9 @@ def test_history_tells_every_phase_and_keeps_the_bound(clip, done):
 
 @pytest.mark.parametrize("phase", PHASES, ids=lambda p: p.name)
 def test_a_phase_moves_what_it_says_and_nothing_else(fit, phase):
-    fit.step(PHASES[0], 5, 0)
+    fit.step(PHASES[0], [5], 0)
     before = {name: t.detach().clone() for name, t in fit.adam.tensors.items()}
-    fit.step(phase, 6, 1)
+    fit.step(phase, [6], 1)
     moved = {name for name, t in fit.adam.tensors.items() if not torch.equal(t.detach(), before[name])}
     field = {"planes", *fit.head}
     colours = {name for name in moved if name in fit.tint}
@@ -135,16 +135,16 @@ def test_a_phase_moves_what_it_says_and_nothing_else(fit, phase):
 
 @pytest.mark.parametrize("iteration", [0, 1, 2])
 def test_the_trajectory_term_acts_every_other_iteration_of_its_phases(clip, fit, iteration):
-    fit.step(PHASES[0], 5, 0)
+    fit.step(PHASES[0], [5], 0)
     calm = clip.settings.model_copy(update={"trajectory": 0.0})
     for phase in PHASES:
         values = []
         for settings in (clip.settings, calm):
             fit.settings = settings
             field, mean = fit.current_field(), fit.adam.tensors["mean"]
-            moved, _, _, grow = field(mean, fit.seen.frame[4] / clip.camera.fps)
+            moved, _, _, grow = field.at(mean, [fit.seen.frame[4] / clip.camera.fps])
             radius = (fit.adam.tensors["scale"] + grow).exp()
-            values.append(fit.priors(phase, field, radius, moved, 4, iteration).item())
+            values.append(fit.priors(phase, field, radius, moved, fit.seen.of([4]), iteration).item())
         assert (values[0] > values[1]) == (phase.trajectory and iteration != 1)
 
 
@@ -153,14 +153,14 @@ def test_the_rest_scene_says_nothing_of_the_field(clip, fit):
     calm = clip.settings.model_copy(update={"smoothness_space": 0.0, "smoothness_time": 0.0})
     fit.settings = calm
     before = {name: t.detach().clone() for name, t in fit.adam.tensors.items()}
-    fit.step(PHASES[0], 0, 0)
+    fit.step(PHASES[0], [0], 0)
     assert all(torch.equal(fit.adam.tensors[name].detach(), before[name]) for name in ("planes", *fit.head))
 
 
 def test_a_number_that_is_not_finite_stops_the_fit_and_names_the_frame(fit):
     fit.seen.rgb[3, 0, 0] = torch.nan
     with pytest.raises(Problem, match="iteration 7, frame 4"):
-        fit.finite([(6, 2, fit.step(PHASES[0], 2, 6)), (7, 3, fit.step(PHASES[0], 3, 7))])
+        fit.finite([(6, [2], fit.step(PHASES[0], [2], 6)), (7, [3], fit.step(PHASES[0], [3], 7))])
 
 
 def test_a_fit_is_stopped_by_it(fit):
@@ -173,3 +173,30 @@ def test_inputs_of_two_clips_are_refused(clip):
     short = replace(clip.depth, z=clip.depth.z[1:], confidence=clip.depth.confidence[1:])
     with pytest.raises(Problem, match="not of one clip"):
         reconstruct(*parts(clip, depth=short))
+
+
+def test_a_round_of_steps_looks_at_each_frame_once_and_at_the_rest_scene_out_of_turn(clip, fit):
+    fit.settings = clip.settings.model_copy(update={"frames_per_step": 3, "rest_every": 2})
+    looked = [fit.next_frames(i) for i in range(6)]
+    assert [len(frames) for frames in looked] == [3] * 6
+    assert all(frames[0] == 0 for frames in looked[::2])
+    count = len(fit.seen.frame)
+    in_turn = [u for i, frames in enumerate(looked) for u in frames[i % 2 == 0 :]]
+    assert sorted(in_turn[:count]) == list(range(count))
+
+
+def test_frames_that_a_step_looks_at_together_count_alike(clip, fit):
+    """Twice the same frame is that frame; two that show as much tissue are their mean."""
+    fit.settings = clip.settings.model_copy(update={"trajectory": 0.0})
+    fit.step(PHASES[0], [5], 0)
+
+    def loss(frames):
+        before = {name: tensor.detach().clone() for name, tensor in fit.adam.tensors.items()}
+        value = fit.step(PHASES[1], frames, 1)
+        for name, tensor in before.items():
+            fit.adam.tensors[name].data.copy_(tensor)
+        return value
+
+    first, second = loss([1]), loss([2])
+    assert torch.allclose(loss([1, 1]), first, rtol=1e-5)
+    assert torch.allclose(loss([1, 2]), (first + second) / 2, rtol=1e-3)

@@ -8,7 +8,7 @@ from test_reconstruct import parts
 
 from surgisim.deformation.field import displace, load_field
 from surgisim.gaussians.reconstruct import reconstruct
-from surgisim.gaussians.tint import knots, shares, tinted
+from surgisim.gaussians.tint import clock, knots, shares, tinted
 
 
 @pytest.mark.parametrize("count", [1, 4, 7])
@@ -25,6 +25,22 @@ def test_colours_at_a_knot_are_its_own_and_between_two_the_middle():
     assert np.allclose(tinted(color, at_knots, 0.4), color + at_knots[1])
     assert np.allclose(tinted(color, at_knots, 0.5), color + (at_knots[1] + at_knots[2].astype(float)) / 2, atol=1e-3)
     assert np.array_equal(tinted(color, at_knots, 0.0), color)
+
+
+def test_what_lies_between_two_frames_that_are_looked_at_is_half_way():
+    moments = np.array([0, 1, 2, 4, 5]) / 25
+    assert [clock(t / 25, moments) for t in (0, 1, 3, 5)] == pytest.approx([0, 0.25, 0.625, 1])
+    assert clock(0.3, moments[:1]) == 0
+
+
+def test_scales_are_one_at_the_frames_that_are_looked_at(fit):
+    for k, name in enumerate(fit.tint):
+        fit.adam.tensors[name] += 0.01 * (k + 1)
+    scene, _, at_knots = fit.result()
+    assert len(at_knots) == len(fit.moments) - 1 > len(fit.tints[0])
+    for time in fit.moments:
+        gone = clock(time, fit.moments)
+        assert np.allclose(tinted(scene.color, at_knots, gone), scene.color + fit.added(gone).numpy(), atol=1e-6)
 
 
 def test_there_are_knots_for_any_clip():

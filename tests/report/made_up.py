@@ -254,7 +254,7 @@ def _deformation(world: World) -> Deformation:
     history = np.stack([i, loss, quality, 900 + i / 10, phase], -1).astype(np.float32)
     sizes, duration = np.array([[3, 3, 2, 3]]), world.camera.frames / world.camera.fps
     field = still_field(np.array([-0.1, -0.1, 0.01, 0.0]), np.array([0.1, 0.1, 0.2, duration]), sizes, 2, 4, world.rng)
-    return save_field(field, np.zeros((1, 2, 3)), history)
+    return save_field(field, np.zeros(1), np.zeros((1, 2, 3)), history)
 
 
 def _physics() -> Physics:
