@@ -221,8 +221,8 @@ class Fit:
         return total
 
     def off_midway(self, field: Field, turn: int) -> torch.Tensor:
-        """How far Gaussians are from half way between the two frames beside one that is not looked at, each of which has
-        its turn [median first radius]."""
+        """How far Gaussians are, in a frame that is not looked at, from half way between those beside it [median first
+        radius]; such frames take turns."""
         time = self.unseen[turn % len(self.unseen)]
         k = int(np.searchsorted(self.moments, time))
         before, after = self.moments[k - 1], self.moments[k]
