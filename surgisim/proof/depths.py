@@ -1,0 +1,76 @@
+"""Backends of depth beside a depth that came with the recording, as JSON.
+
+    python -m surgisim.proof.depths results/CLIP/main --backends near_light stereo
+
+Mean of |z - z_given| / z_given over tissue in all frames, after one factor for the clip; and, to have something to beat,
+that of the plane which fits each frame's given depth best, and so knows what the backends do not.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from surgisim.artifacts.base import load
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.correspondence import Correspondence
+from surgisim.artifacts.frames import Frames
+from surgisim.artifacts.given import Given
+from surgisim.artifacts.inpainted import Inpainted
+from surgisim.artifacts.masks import Masks
+from surgisim.config.depth import Depth
+from surgisim.measure.depth_error import depth_error, scale_between
+from surgisim.perception.depth.distance import depth
+from surgisim.problem import Problem
+
+
+def plane(z: np.ndarray, counted: np.ndarray) -> np.ndarray:
+    """The plane in space that fits depth [m], (H, W), best where it counts: 1 / z is linear in pixels."""
+    row, column = np.indices(z.shape)
+    basis = np.stack([np.ones(z.shape), column, row], -1) / max(z.shape)
+    # Squares of 1 / z, weighed by z^2, count errors of z itself to first order.
+    weight = z[counted].astype(float) ** 2
+    fitted = np.linalg.lstsq(basis[counted] * weight[:, None], weight / z[counted], rcond=None)[0]
+    return 1 / (basis @ fitted)
+
+
+def off(found: np.ndarray, given: np.ndarray, counted: np.ndarray) -> float:
+    """Mean absolute relative error [%] after one factor."""
+    error = depth_error(found, given, counted, scale=scale_between(found, given, counted))
+    return round(100 * error.relative, 2) if error else float("nan")
+
+
+def compared(home: Path, backends: list[str]) -> dict[str, float]:
+    """Each backend's error and the plane's. Raises Problem where no depth was given."""
+    given = load(Given, home / "ingest" / "given.npz")
+    if not len(given.depth):
+        raise Problem(
+            f"{home}: no depth came with this recording, so there is nothing to compare with. Pass one that has."
+        )
+    frames, camera = load(Frames, home / "ingest" / "frames.npz"), load(Camera, home / "ingest" / "camera.json")
+    masks = load(Masks, home / "masking" / "masks.npz")
+    inpainted = load(Inpainted, home / "inpainting" / "inpainted.npz")
+    surface = load(Correspondence, home / "correspondence" / "correspondence.npz")
+    counted = masks.tissue & (given.depth > 0)
+    planes = np.stack([plane(z, m) for z, m in zip(given.depth, counted, strict=True)])
+    errors = {"plane": off(planes, given.depth, counted)}
+    for backend in backends:
+        z = depth(frames, inpainted, masks, surface, given, camera, Depth(backend=backend)).z
+        errors[backend] = off(z, given.depth, counted)
+        print(backend, errors[backend], file=sys.stderr, flush=True)
+    return errors
+
+
+def main() -> None:
+    cli = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    cli.add_argument("results", type=Path, help="a clip's folder with ingest/ to correspondence/")
+    cli.add_argument("--backends", nargs="+", default=["near_light"], help="of depth")
+    args = cli.parse_args()
+    json.dump({"unit": "%", **compared(args.results, args.backends)}, sys.stdout, indent=1)
+    print()
+
+
+if __name__ == "__main__":
+    main()
