@@ -12,7 +12,7 @@ class Reconstruction(Settings):
     """Optimisation steps [1]."""
     frames_per_step: int = Field(1, ge=1)
     """Frames that a step looks at; a GPU takes hardly longer for a few than for one [1]."""
-    phases: tuple[float, float, float] = (0.2, 0.5, 0.9)
+    phases: tuple[float, float, float] = (0.2, 0.5, 0.7)
     """Ends of the coarse phase, of the trajectory phase and of the field's refinement; from the last on the field is
     frozen and the canonical scene refined [fraction of iterations]."""
     seed: int = 0
@@ -48,10 +48,10 @@ class Reconstruction(Settings):
     """'default' asks neighbours for equal motion, 'literal' is the paper's printed sum of dot products [-]."""
     neighbours: int = Field(5, ge=1)
     """Neighbours of each Gaussian in the trajectory term [1]."""
-    correspondence: float = Field(0.1, ge=0)
+    correspondence: float = Field(0.3, ge=0)
     """Weight of how far the field carries Gaussians past where the surface was seen to go, 0 switches it off; of
     errors counted in 1 % of the longest image side [1]."""
-    midway: float = Field(0.01, ge=0)
+    midway: float = Field(0.003, ge=0)
     """Weight of how far Gaussians are from half way in frames that are not looked at, 0 switches it off; counted in
     median first radii [1]."""
     anisotropy: float = Field(1.0, ge=0)
@@ -67,7 +67,7 @@ class Reconstruction(Settings):
     the texture is wide [1]."""
     pooled_sizes: tuple[float, ...] = (0.025, 0.075)
     """Sides of the blocks [longest image side]."""
-    squared: float = Field(4.0, ge=0)
+    squared: float = Field(1.0, ge=0)
     """Weight of the squared colour misfit beside the absolute one, of colours 0-1: few pixels that are far off, such as
     highlights, are what PSNR counts [1]."""
     depth: float = Field(0.5, ge=0)

@@ -2,7 +2,7 @@
 
     python -m surgisim.proof.depths results/CLIP/main --backends near_light stereo
 
-Mean of |z - z_given| / z_given over tissue in all frames, after one factor for the clip; and, to have something to beat,
+Mean of |z - z_given| / z_given over tissue in all frames, after one factor for the clip; and, as something to beat,
 that of the plane which fits each frame's given depth best, and so knows what the backends do not.
 """
 
