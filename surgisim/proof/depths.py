@@ -25,14 +25,21 @@ from surgisim.measure.depth_error import depth_error, scale_between
 from surgisim.perception.depth.distance import depth
 from surgisim.problem import Problem
 
+ROUNDS, LEAST = 30, 1e-3
+"""Rounds of weights, and the error below which it no longer matters which is smaller [1]."""
+
 
 def plane(z: np.ndarray, counted: np.ndarray) -> np.ndarray:
-    """The plane in space that fits depth [m], (H, W), best where it counts: 1 / z is linear in pixels."""
+    """The plane in space whose relative distance from depth [m], (H, W), is least where it counts: 1 / z is linear in
+    pixels. Least absolute errors by weights over and over, since a few depths that came with recordings are absurd."""
     row, column = np.indices(z.shape)
-    basis = np.stack([np.ones(z.shape), column, row], -1) / max(z.shape)
-    # Squares of 1 / z, weighed by z^2, count errors of z itself to first order.
-    weight = z[counted].astype(float) ** 2
-    fitted = np.linalg.lstsq(basis[counted] * weight[:, None], weight / z[counted], rcond=None)[0]
+    basis = np.stack([np.ones(z.shape), column / max(z.shape), row / max(z.shape)], -1)
+    # z over the plane's is 1 where they agree.
+    rows = basis[counted] * z[counted, None].astype(float)
+    weight = np.ones(len(rows))
+    for _ in range(ROUNDS):
+        fitted = np.linalg.lstsq(rows * weight[:, None], weight, rcond=None)[0]
+        weight = np.maximum(abs(rows @ fitted - 1), LEAST) ** -0.5
     return 1 / (basis @ fitted)
 
 
