@@ -22,8 +22,8 @@ class Deformation(Artifact):
     moments: np.ndarray
     """When the frames were taken that were looked at, (M,)."""
     tint: np.ndarray
-    """What is added to each Gaussian's colour at knots spread evenly over those frames, none at the first, sRGB 0-1,
-    (K, G, 3) float16; see surgisim.gaussians.tint."""
+    """What is added to each Gaussian's colour in those frames but the first, straight between them, sRGB 0-1,
+    (M - 1, G, 3) float16; see surgisim.gaussians.tint."""
     history: np.ndarray
     """Iteration, loss, PSNR [dB] on used frames, Gaussians, phase, (R, 5) float32."""
 

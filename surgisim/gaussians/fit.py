@@ -264,7 +264,8 @@ class Fit:
         self.adam.watch(())
         arrays = {name: self.adam.tensors[name].cpu().numpy().copy() for name in ATTRIBUTES}
         arrays["rotation"] /= np.linalg.norm(arrays["rotation"], axis=1, keepdims=True)
-        count = max(map(len, self.tints))
+        # All scales together are straight between frames that are looked at, or nearly so.
+        count = max(len(self.moments) - 1, 1)
         at_knots = np.stack([self.added((k + 1) / count).cpu().numpy() for k in range(count)])
         return Scene(**arrays), self.current_field().on(torch.device("cpu")), at_knots
 
