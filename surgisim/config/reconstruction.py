@@ -11,7 +11,7 @@ class Reconstruction(Settings):
     iterations: int = Field(3000, ge=10)
     """Optimisation steps [1]."""
     frames_per_step: int = Field(1, ge=1)
-    """Frames that a step looks at; a GPU takes hardly longer for a few than for one [1]."""
+    """Frames that a step looks at; a GPU draws them at once [1]."""
     phases: tuple[float, float, float] = (0.2, 0.5, 0.7)
     """Ends of the coarse phase, of the trajectory phase and of the field's refinement; from the last on the field is
     frozen and the canonical scene refined [fraction of iterations]."""

@@ -100,8 +100,8 @@ def _draw(mean, rotation, scale, opacity, color, camera, background, near, mode)
     from gsplat import rasterization
 
     sets = mean.shape[:-2]
-    there = (a.expand(*sets, *a.shape) for a in (*_views(camera, mean.device), _constant((background,), mean.device)))
-    view, lens, behind = there
+    shared = *_views(camera, mean.device), _constant((background,), mean.device)
+    view, lens, behind = (a.expand(*sets, *a.shape) for a in shared)
     image, alpha, facts = rasterization(
         mean,
         rotation,

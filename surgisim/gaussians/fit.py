@@ -199,21 +199,22 @@ class Fit:
             unit = settings.anisotropy_unit * self.radius
             limits = {"r_m": settings.anisotropy_largest, "r_ani": settings.anisotropy_ratio}
             total = total + settings.anisotropy * anisotropic(radius.flatten(0, 1), unit=unit, **limits)
+        if phase.moves_field:
+            space, rough = field.roughness()
+            total = total + settings.smoothness_space * space + settings.smoothness_time * rough
         if not times.any():
-            return total + (self.smoothness(field) if phase.moves_field else 0.0)
+            return total
         if phase.trajectory and settings.trajectory and iteration % TRAJECTORY_EVERY == 0:
             if self.groups is None:
                 points = self.adam.tensors["mean"].detach().cpu().numpy()
                 self.groups = torch.from_numpy(groups(points, settings.neighbours)).to(self.device)
-            # One of several frames tells as well as all: it asks for the field once more.
-            k = int(times.argmax())
+            # One of several frames does for all: it asks for the field once more.
+            k = np.flatnonzero(times)[-1]
             before = field(self.adam.tensors["mean"], times[k] - 1 / self.camera.fps)[0]
             literal = settings.trajectory_form == "literal"
             total = total + TRAJECTORY_EVERY * settings.trajectory * trajectory(
                 (moved[k] - before) / self.radius, self.groups, literal=literal
             )
-        if phase.moves_field:
-            total = total + self.smoothness(field)
         if phase.moves_field and settings.correspondence:
             total = total + settings.correspondence * self.astray(moved, seen)
         if phase.moves_field and settings.midway and len(self.unseen) and iteration % MIDWAY_EVERY == 0:
@@ -230,11 +231,6 @@ class Fit:
         with torch.no_grad():
             first, last = field.at(mean, [before, after])[0]
         return (field(mean, time)[0] - torch.lerp(first, last, share)).norm(dim=1).mean() / self.radius
-
-    def smoothness(self, field: Field) -> torch.Tensor:
-        """What is asked of the planes alone."""
-        space, rough = field.roughness()
-        return self.settings.smoothness_space * space + self.settings.smoothness_time * rough
 
     def astray(self, moved: torch.Tensor, seen: Observations) -> torch.Tensor:
         """How far the field carries Gaussians past where the surface was seen to go; the scene at rest stays."""

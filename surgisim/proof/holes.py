@@ -57,7 +57,8 @@ def quiet(done: float, of: float, text: str) -> None:
 
 def told(estimate: Estimate) -> dict[str, Any]:
     """A mean over frames with its 90 % interval, as JSON holds it."""
-    return {"value": round(estimate.value, 2), "interval": [estimate.low, estimate.high], "frames": estimate.count}
+    ends = [None if end is None else round(end, 2) for end in (estimate.low, estimate.high)]
+    return {"value": round(estimate.value, 2), "interval": ends, "frames": estimate.count}
 
 
 def main() -> None:

@@ -96,6 +96,33 @@ GPU = pytest.mark.skipif(bool(lacking()), reason=f"gsplat needs {lacking()}")
 
 
 @pytest.mark.parametrize(("engine", "device"), [("numba", "cpu"), pytest.param("gsplat", "cuda", marks=GPU)])
+def test_no_gaussians_at_all_have_gradients_of_no_length(engine, device):
+    view = camera(48, 32)
+    found = gradients([t[:0] for t in cloud(5, view)], view, engine, torch.float32, device=device)
+    assert found["mean"].shape == (0, 3)
+
+
+def test_the_probe_says_how_a_shift_of_the_centre_in_pixels_changes_the_loss():
+    view = camera(48, 32)
+    scene = one(view)
+    found = gradients(scene, view, "numba", torch.float32, ("alpha",))
+    expected = found["mean"][0, :2] * scene[0][0, 2] / torch.tensor([view.fx, view.fy])
+    # Moving a round Gaussian across the view also turns its ellipse a little.
+    assert torch.allclose(found["probe"][0], expected, rtol=0.05, atol=1e-3)
+
+
+@GPU
+def test_the_cuda_engine_agrees_with_the_twin():
+    view = camera(61, 47)
+    scene = cloud(200, view, seed=2)
+    scene[3] = scene[3] * 0.9
+    fast = gradients(scene, view, "gsplat", torch.float32, device="cuda")
+    slow = gradients(scene, view, "twin", torch.float64)
+    for name in fast:
+        assert distance(fast[name], slow[name]) < TOLERANCE["cuda"], name
+
+
+@pytest.mark.parametrize(("engine", "device"), [("numba", "cpu"), pytest.param("gsplat", "cuda", marks=GPU)])
 def test_several_sets_at_once_are_drawn_as_one_by_one(engine, device):
     view = camera(48, 32)
     clouds = [[t.to(device, torch.float32) for t in cloud(60, view, seed=seed)] for seed in (3, 4, 5)]
