@@ -43,16 +43,12 @@ def planted(frames: Frames, masks: Masks, settings: Inpainting) -> dict[str, np.
     blank[hole] = 0
     hidden = masks.tool | hole
     seen = replace(masks, tool=hidden, tissue=masks.tissue & ~hole)
-    filled = without_tool(Frames(blank, frames.split), seen, settings, progress=quiet).rgb
+    filled = without_tool(Frames(blank, frames.split), seen, settings, progress=lambda *_: None).rgb
     ours, telea = np.full((2, len(blank)), np.nan)
     for t in np.flatnonzero(counted.sum((1, 2)) >= LEAST):
         alone = cv2.inpaint(blank[t], hidden[t].astype(np.uint8), 5, cv2.INPAINT_TELEA)
         ours[t], telea[t] = (psnr(a, frames.rgb[t], counted[t]) for a in (filled[t], alone))
     return {"ours": ours, "telea": telea, "hidden": hole.mean((1, 2))}
-
-
-def quiet(done: float, of: float, text: str) -> None:
-    """Progress that nobody watches."""
 
 
 def told(estimate: Estimate) -> dict[str, Any]:
