@@ -11,12 +11,47 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from torch.nn.functional import grid_sample
+from torch.nn.functional import grid_sample, pad
 
 from surgisim.deformation.planes import SPACE, Layout
 
 DOWN, ACROSS = [i for i, _ in SPACE], [j for _, j in SPACE]
 """Axes along a space plane's rows and columns."""
+PLACES = 512
+"""Places whose slopes are one product of matrices: a GPU works at many of them, and is slow at one long one."""
+
+
+class Along(torch.autograd.Function):
+    """Lines of W knots read at G places each: lines (S, W, K), places in knots (S, G) -> (S, G, K).
+
+    Many places give their slopes back to few knots. Added one by one they would wait for each other; here they are the
+    product of two matrices, the first of which says how much of each knot a place read.
+    """
+
+    @staticmethod
+    def forward(ctx, lines, places):
+        low = places.long()
+        # A place at its line's last knot reads nothing of what lies beside it.
+        high = (low + 1).clamp(max=lines.shape[1] - 1)
+        share = places - low
+        ctx.save_for_backward(lines, low, high, share)
+        line = torch.arange(len(lines), device=lines.device)[:, None]
+        return torch.lerp(lines[line, low], lines[line, high], share[..., None])
+
+    @staticmethod
+    def backward(ctx, slope):
+        lines, low, high, share = ctx.saved_tensors
+        to_lines = to_places = None
+        if ctx.needs_input_grad[0]:
+            blank = -low.shape[1] % PLACES
+            read = slope.new_zeros(len(low), low.shape[1] + blank, lines.shape[1])
+            read.scatter_(2, low[..., None], 1 - share[..., None]).scatter_add_(2, high[..., None], share[..., None])
+            few, many = (a.unflatten(1, (-1, PLACES)) for a in (read, pad(slope, (0, 0, 0, blank))))
+            to_lines = (few.mT @ many).sum(1)
+        if ctx.needs_input_grad[1]:
+            line = torch.arange(len(lines), device=lines.device)[:, None]
+            to_places = (slope * (lines[line, high] - lines[line, low])).sum(-1)
+        return to_lines, to_places
 
 
 class Sheets:
@@ -30,9 +65,12 @@ class Sheets:
         self.size = tuple(max(shape[k] for shape in self.shapes) for k in range(2))
         self.spatial = 3 * len(layout.sizes)
         """Sheets of space planes, which come first."""
-        share = 2 * (np.array(self.shapes) - 1) / (np.array(self.size) - 1)
-        self.rows, self.columns = (self._put(share[:, k].reshape(2, -1, 3, 1)) for k in range(2))
-        """How far a plane reaches along the sheet, whose side is 2 long, (2, L, 3, 1) each."""
+        share = 2 * (np.array(self.shapes[: self.spatial]) - 1) / (np.array(self.size) - 1)
+        self.rows, self.columns = (self._put(share[:, k].reshape(-1, 3, 1)) for k in range(2))
+        """How far a space plane reaches along the sheet, whose side is 2 long, (L, 3, 1) each."""
+        self.steps = self._put(layout.sizes[:, :3, None] - 1)
+        """From a line's first knot to its last, (L, 3, 1)."""
+        self._rows: dict[float, torch.Tensor] = {}
 
     def pack(self, flat: torch.Tensor) -> torch.Tensor:
         """The sheets, (6 L, C, H, W), of all planes end to end."""
@@ -51,14 +89,12 @@ class Sheets:
     def features(self, sheets: torch.Tensor, where: torch.Tensor, clocks: Sequence[float]) -> torch.Tensor:
         """Feature of every point at each of B times, (B, G, L C), as `planes.features` of all planes end to end."""
         at = where.clamp(0, 1).T
+        space = self._space(sheets[: self.spatial], at)
         # Each point lies there at those times and, beside that, at the start.
         times = [min(max(clock, 0.0), 1.0) for clock in clocks] + [0.0]
-        clock = torch.stack([torch.full_like(at, time) for time in times], -1).flatten(1)
-        space = self._read(sheets[: self.spatial], at[DOWN], at[ACROSS], 0)
-        moved = self._read(sheets[self.spatial :], clock, at.repeat_interleave(len(times), 1), 1)
-        moved = moved.unflatten(-1, (-1, len(times)))
-        found = space[..., None] * (moved[..., :-1] - moved[..., -1:])
-        return found.permute(3, 2, 0, 1).flatten(2)
+        moved = self._moved(sheets[self.spatial :], at, times)
+        found = space.mT[:, :, None] * (moved[:, :, :-1] - moved[:, :, -1:])
+        return found.permute(2, 1, 0, 3).flatten(2)
 
     def roughness(self, sheets: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """L_space and L_time, as `smoothness.roughness` of all planes end to end."""
@@ -67,12 +103,31 @@ class Sheets:
         rough = (sheets.diff(dim=-1).square() * across).sum() + (space.diff(dim=-2).square() * down).sum()
         return rough, (time.diff(n=2, dim=-2).square() * later).sum()
 
-    def _read(self, sheets: torch.Tensor, down: torch.Tensor, across: torch.Tensor, kind: int) -> torch.Tensor:
-        """Product of each scale's three planes, (L, C, N), at `down` and `across` of them, 0-1, (3, N) each."""
-        grid = torch.stack([across * self.columns[kind] - 1, down * self.rows[kind] - 1], -1)
+    def _space(self, sheets: torch.Tensor, at: torch.Tensor) -> torch.Tensor:
+        """Product of each scale's three space planes, (L, C, G), at positions 0-1, (3, G)."""
+        grid = torch.stack([at[ACROSS] * self.columns - 1, at[DOWN] * self.rows - 1], -1)
         found = grid_sample(sheets, grid.flatten(0, 1)[:, None], align_corners=True)[:, :, 0]
         first, second, third = found.unflatten(0, (-1, 3)).unbind(1)
         return first * second * third
+
+    def _moved(self, sheets: torch.Tensor, at: torch.Tensor, times: Sequence[float]) -> torch.Tensor:
+        """Product of each scale's three time planes, (L, G, T, C), at positions 0-1, (3, G), and T times, 0-1."""
+        shares = torch.stack([self._rows_at(time) for time in times])
+        lines = torch.einsum("sachw,tsh->sawtc", sheets.unflatten(0, (-1, 3)), shares)
+        found = Along.apply(lines.flatten(0, 1).flatten(2), (at * self.steps).flatten(0, 1))
+        first, second, third = found.unflatten(-1, (len(times), -1)).unflatten(0, (-1, 3)).unbind(1)
+        return first * second * third
+
+    def _rows_at(self, time: float) -> torch.Tensor:
+        """How much of each row of knots a time plane's line at this time, 0-1, is made of, (L, H)."""
+        if time not in self._rows:
+            shares = np.zeros((len(self.layout.sizes), self.size[0]))
+            for share, n in zip(shares, self.layout.sizes[:, 3], strict=True):
+                k = min(int(time * (n - 1)), n - 2)
+                share[k : k + 2] = k + 1 - time * (n - 1), time * (n - 1) - k
+            # Kept: bringing them there waits for all that a GPU still does, and a clip has few moments.
+            self._rows[time] = self._put(shares)
+        return self._rows[time]
 
     @cached_property
     def _means(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:

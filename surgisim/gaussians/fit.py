@@ -30,6 +30,8 @@ WIDEST = 10.0
 TRAJECTORY_EVERY = 2
 """Iterations from one to the next that counts the trajectory term, as many times over: it costs as much as the whole
 field once more."""
+SMOOTHED_EVERY = 4
+"""Iterations from one to the next that counts how rough the field is, as many times over."""
 WEIGHED_EVERY = 2
 """Iterations from one to the next that tells a GPU's engine what each Gaussian adds to the picture, for which it draws
 that once more."""
@@ -80,7 +82,7 @@ class Fit:
             phase = phase_at(i, total, self.settings.phases)
             if i in renewals:
                 self.renew()
-            frames = self.next_frames(i)
+            frames = self.next_frames(phase, i)
             steps.append((i, frames, self.step(phase, frames, i)))
             reports = (i + 1) % every == 0 or i == total - 1
             # A GPU that is asked after every step waits for each.
@@ -96,11 +98,11 @@ class Fit:
                 rows = []
         return np.array(history, np.float32)
 
-    def next_frames(self, iteration: int) -> list[int]:
+    def next_frames(self, phase: Phase, iteration: int) -> list[int]:
         """Which of the seen frames an iteration looks at."""
         # Frame 0 is the rest scene: seen no oftener than others, the scene would settle where it is on average.
-        rest = self.settings.rest_every and iteration % self.settings.rest_every == 0
-        frames = [0] if rest else []
+        often = self.settings.rest_every if phase.moves_canonical else 0
+        frames = [0] if often and iteration % often == 0 else []
         while len(frames) < self.settings.frames_per_step:
             if not self.order:
                 self.order = self.rng.permutation(len(self.seen.frame)).tolist()
@@ -131,9 +133,7 @@ class Fit:
         field = self.current_field()
         mean, color = adam.tensors["mean"], adam.tensors["color"]
         moved, opacity, turn, grow = field.at(mean, times)
-        added = (
-            torch.stack([self.added(clock(time, self.moments)) for time in times]) if shown else torch.zeros_like(moved)
-        )
+        added = self.added([clock(time, self.moments) for time in times]) if shown else torch.zeros_like(moved)
         radius = (adam.tensors["scale"] + grow).exp()
         recorded = iteration < RENEWALS[-1] * self.settings.iterations
         on_cpu = self.device.type == "cpu"
@@ -154,7 +154,9 @@ class Fit:
         loss = self.misfit(phase, image, seen) + self.priors(phase, field, radius, moved, seen, iteration)
         if shown and self.settings.tint:
             loss = loss + self.settings.tint * added.abs().mean()
-        loss.backward()
+        # Frame 0 says nothing of the field.
+        if loss.requires_grad:
+            loss.backward()
         if phase.moves_field and not any(times):
             # The rest scene says nothing of the head: its slope is zero, and its moments decay as ever.
             for name in self.head:
@@ -167,10 +169,9 @@ class Fit:
         error = (wrong * whole).sum() / whole.sum().clamp(min=1)
         return torch.stack([loss.detach(), error])
 
-    def added(self, gone: float) -> torch.Tensor:
-        """What is added to the colours then, sRGB 0-1, (G, 3); 0 at the first moment."""
-        nothing = torch.zeros_like(self.adam.tensors["color"])
-        return sum((tint([self.adam.tensors[name] for name in names], gone) for names in self.tints), nothing)
+    def added(self, gone: Sequence[float]) -> torch.Tensor:
+        """What is added to the colours at B moments, sRGB 0-1, (B, G, 3); 0 at the first."""
+        return tint([[self.adam.tensors[name] for name in names] for names in self.tints], gone)
 
     def misfit(self, phase: Phase, image: Image, seen: Observations) -> torch.Tensor:
         """Colour and depth of some frames against what was seen."""
@@ -199,9 +200,10 @@ class Fit:
             unit = settings.anisotropy_unit * self.radius
             limits = {"r_m": settings.anisotropy_largest, "r_ani": settings.anisotropy_ratio}
             total = total + settings.anisotropy * anisotropic(radius.flatten(0, 1), unit=unit, **limits)
-        if phase.moves_field:
+        if phase.moves_field and iteration % SMOOTHED_EVERY == 0:
             space, rough = field.roughness()
-            total = total + settings.smoothness_space * space + settings.smoothness_time * rough
+            smoothness = settings.smoothness_space * space + settings.smoothness_time * rough
+            total = total + SMOOTHED_EVERY * smoothness
         if not times.any():
             return total
         if phase.trajectory and settings.trajectory and iteration % TRAJECTORY_EVERY == 0:
@@ -262,7 +264,7 @@ class Fit:
         arrays["rotation"] /= np.linalg.norm(arrays["rotation"], axis=1, keepdims=True)
         # All scales together are straight between frames that are looked at, or nearly so.
         count = max(len(self.moments) - 1, 1)
-        at_knots = np.stack([self.added((k + 1) / count).cpu().numpy() for k in range(count)])
+        at_knots = np.concatenate([self.added([(k + 1) / count]).cpu().numpy() for k in range(count)])
         return Scene(**arrays), self.current_field().on(torch.device("cpu")), at_knots
 
 

@@ -32,9 +32,18 @@ def shares(gone: float, count: int) -> dict[int, float]:
     return {k: share for k, share in told.items() if k >= 0 and share > 0}
 
 
-def tint(at_knots: Sequence[torch.Tensor], gone: float) -> torch.Tensor | float:
-    """What is added to the colours, sRGB 0-1, (G, 3), of what it is at K knots; 0 at the first moment."""
-    return sum((share * at_knots[k] for k, share in shares(gone, len(at_knots)).items()), 0.0)
+def tint(at_knots: Sequence[Sequence[torch.Tensor]], gone: Sequence[float]) -> torch.Tensor:
+    """What is added to the colours, sRGB 0-1, at B moments, (B, G, 3), of what each scale is at its knots, (G, 3) each;
+    0 at the first moment."""
+    nothing = torch.zeros_like(at_knots[0][0])
+    told = [[(scale[k], share) for scale in at_knots for k, share in shares(g, len(scale)).items()] for g in gone]
+    parts = [part for one in told for part in one]
+    if not parts:
+        return torch.stack([nothing] * len(gone))
+    # All at once: a GPU waits for each that it is told of.
+    shared = iter(torch._foreach_mul([a for a, _ in parts], [share for _, share in parts]))
+    each = [[next(shared) for _ in one] for one in told]
+    return torch.stack([torch.stack(one).sum(0) if one else nothing for one in each])
 
 
 def tinted(color: np.ndarray, at_knots: np.ndarray, gone: float) -> np.ndarray:

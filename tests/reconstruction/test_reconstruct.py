@@ -177,12 +177,25 @@ def test_inputs_of_two_clips_are_refused(clip):
 
 def test_a_round_of_steps_looks_at_each_frame_once_and_at_the_rest_scene_out_of_turn(clip, fit):
     fit.settings = clip.settings.model_copy(update={"frames_per_step": 3, "rest_every": 2})
-    looked = [fit.next_frames(i) for i in range(6)]
+    looked = [fit.next_frames(PHASES[0], i) for i in range(6)]
     assert [len(frames) for frames in looked] == [3] * 6
     assert all(frames[0] == 0 for frames in looked[::2])
     count = len(fit.seen.frame)
     in_turn = [u for i, frames in enumerate(looked) for u in frames[i % 2 == 0 :]]
     assert sorted(in_turn[:count]) == list(range(count))
+
+
+def test_a_field_that_is_fitted_alone_is_not_asked_about_the_rest_scene(clip, fit):
+    """Nothing moves there, whatever the field is: a step that looks at it alone changes nothing."""
+    refine = PHASES[2]
+    fit.settings = clip.settings.model_copy(update={"rest_every": 1})
+    count = len(fit.seen.frame)
+    looked = [u for i in range(count) for u in fit.next_frames(refine, i)]
+    assert sorted(looked) == list(range(count))
+    fit.step(PHASES[1], [1], 1)
+    before = fit.adam.tensors["planes"].clone()
+    fit.step(refine, [0], 1)
+    assert torch.equal(fit.adam.tensors["planes"], before)
 
 
 def test_frames_that_a_step_looks_at_together_count_alike(clip, fit):
@@ -208,7 +221,7 @@ def test_what_no_frame_tells_lies_half_way_between_its_neighbours(clip, fit):
     for weight in (1.0, 0.0):
         fit.settings = clip.settings.model_copy(update={"midway": weight})
         for i in range(40):
-            fit.step(PHASES[0], fit.next_frames(i), i)
+            fit.step(PHASES[0], fit.next_frames(PHASES[0], i), i)
         with torch.no_grad():
             off[weight] = float(fit.off_midway(fit.current_field(), turn=0))
     assert fit.unseen[0] * clip.camera.fps == pytest.approx(1)

@@ -40,7 +40,7 @@ def test_scales_are_one_at_the_frames_that_are_looked_at(fit):
     assert len(at_knots) == len(fit.moments) - 1 > len(fit.tints[0])
     for time in fit.moments:
         gone = clock(time, fit.moments)
-        assert np.allclose(tinted(scene.color, at_knots, gone), scene.color + fit.added(gone).numpy(), atol=1e-6)
+        assert np.allclose(tinted(scene.color, at_knots, gone), scene.color + fit.added([gone])[0].numpy(), atol=1e-6)
 
 
 def test_there_are_knots_for_any_clip():
