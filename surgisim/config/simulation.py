@@ -12,6 +12,9 @@ class Simulation(Settings):
 
     operation: dict | None = None
     """A new operation (docs/operations.md); null replays the recorded one [-]."""
+    solver: str = "mpm"
+    """What moves the tissue: the material point method with the fitted laws (mpm), or, to hold it against, masses and
+    springs of the same stiffness and viscosity: a file of surgisim/baselines, point_cloud or mesh [name]."""
     render: bool = True
     """Whether to draw the frames [-]."""
     interior: bool = True

@@ -15,6 +15,7 @@ from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.physics import Physics
 from surgisim.artifacts.replay import Replay
 from surgisim.artifacts.scene import Scene
+from surgisim.baselines.run import run as baseline
 from surgisim.config.simulation import Simulation
 from surgisim.gaussians.rim import beyond
 from surgisim.mpm.carried import Carried
@@ -64,16 +65,27 @@ def replay(
     per_frame = checked_per_frame(physics, material, camera.fps) * settings.refine_step
     rim = beyond(scene, camera)
     parts = _parts(body, [scene, rim], physics, task, settings.device)
-    path = _path(parts[0], task, physics, material, camera, per_frame)
-    states, whole = _march([p.simulator for p in parts], theta, path, task, lambda d, t, s: progress(0.5 * d, t, s))
-    frames = len(path.path[0]) // per_frame + 1
+    whole, joules = parts[0].simulator, None
+
+    def half(done: float, total: float, text: str) -> None:
+        progress(0.5 * done, total, text)
+
+    if settings.solver == "mpm":
+        path = _path(parts[0], task, physics, material, camera, per_frame)
+        states = _march([p.simulator for p in parts], theta, path, task, half)
+    else:
+        run, joules = _baseline(parts, task, physics, material, camera, settings, half)
+        states = {t: (whole, run, t) for t in range(len(run.u))}
+    frames = len(states)
     light = None
     if recording is not None and settings.render and settings.relight:
         recorded = [run.u[k] for _, run, k in (states[t] for t in range(frames))]
         if settings.operation is not None:
             again = _recorded(motion, camera)
-            path = _path(parts[0], again, physics, material, camera, per_frame)
-            recorded = whole.run(theta, path).u
+            if settings.solver == "mpm":
+                recorded = whole.run(theta, _path(parts[0], again, physics, material, camera, per_frame)).u
+            else:
+                recorded = _baseline(parts, again, physics, material, camera, settings, half)[0].u
 
         splats = Drawn(scene, rim, body, whole, settings.interior, settings.device)
 
@@ -94,11 +106,11 @@ def replay(
         return *look.measure(u, run.v[k]), nodes, look.picture(u, camera) if settings.render else None
 
     position, nodes, smallest, energy, rgb = [], [], [], [], []
-    for t, (moved, least, joules, displaced, picture) in enumerate(in_order(seen, zip(range(frames)))):
+    for t, (moved, least, held, displaced, picture) in enumerate(in_order(seen, zip(range(frames)))):
         position.append(moved.astype(np.float32))
         nodes.append(displaced)
         smallest.append(least)
-        energy.append(joules)
+        energy.append(held if joules is None else joules[t])
         if settings.render:
             rgb.append(picture)
         progress(0.5 + 0.5 * (t + 1) / frames, 1.0, f"drawing frame {t + 1}/{frames}")
@@ -159,6 +171,29 @@ def _parts(body: Body, scenes: list[Scene], physics: Physics, task: Plan, device
     ]  # fmt: skip
 
 
+def _baseline(
+    parts: list[Prepared],
+    task: Plan,
+    physics: Physics,
+    material: Material,
+    camera: Camera,
+    settings: Simulation,
+    progress: Callable[[float, float, str], None],
+) -> tuple[Run, np.ndarray]:
+    """A run of masses and springs, and its energies [J], (T, 2)."""
+    if task.cut is not None:
+        raise Problem(f"simulation: the solver '{settings.solver}' cannot cut. Take mpm, or leave the cut out.")
+    return baseline(
+        settings.solver,
+        parts[0],
+        values_of(physics),
+        lambda per_frame: _path(parts[0], task, physics, material, camera, per_frame),
+        fps=camera.fps,
+        refine=settings.refine_step,
+        progress=progress,
+    )
+
+
 def _march(parts: list[Simulator], theta, path: Drive, task: Plan, progress):
     """For every frame: simulator, run, and the frame's place in it."""
     whole, last = parts[0], path.frames - 1
@@ -171,7 +206,7 @@ def _march(parts: list[Simulator], theta, path: Drive, task: Plan, progress):
         begin = (*(opened.inherited(whole, a[-1]) for a in (run.u, run.v)), run.q[-1])
         run = opened.run(theta, path, begin=begin, first=switch, last=last, progress=progress)
         states |= {switch + k: (opened, run, k) for k in range(1, last - switch + 1)}
-    return states, whole
+    return states
 
 
 class _Look:

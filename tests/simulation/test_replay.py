@@ -114,3 +114,26 @@ def test_under_an_operation_such_a_body_stays_with_the_base():
     corner = np.linalg.norm(body.rest - [0.018, 0.012, 0.06], axis=1).argmin()
     assert moved[middle, 2] == pytest.approx(-0.003, abs=8e-4)
     assert np.linalg.norm(moved[corner]) < 5e-4
+
+
+@pytest.mark.parametrize("solver", ["point_cloud", "mesh"])
+def test_masses_and_springs_follow_the_same_pull(solver):
+    body = slab()
+    out = replay(body, splats(body), *fitted(body), pulled(frames=14), CAMERA, Simulation(solver=solver), silent)
+    near = np.linalg.norm(body.rest - [0, 0, 0.06], axis=1).argmin()
+    assert np.allclose(out.position[8, near] - body.rest[near], [0.003, 0, -0.006], atol=1.5e-3)
+    held = np.linalg.norm(out.position[8] - body.rest, axis=1)[body.held]
+    assert held.max() < 0.3e-3 + 0.1 * 0.0067
+    assert out.energy[8, 1] > 0 == out.energy[0, 1]
+    assert np.allclose(out.position[0], body.rest, atol=1e-6)
+    assert np.abs(out.rgb[8].astype(int) - out.rgb[0]).max() > 50
+
+
+def test_a_solver_that_is_none_and_a_cut_that_springs_cannot_make_are_said():
+    body = slab()
+    told = body, splats(body), *fitted(body), pulled(frames=14), CAMERA
+    with pytest.raises(Problem, match=r"simulation.solver' is 'jelly'.*mesh.*point_cloud"):
+        replay(*told, Simulation(solver="jelly"), silent)
+    cut = {"seconds": 0.4, "do": [{"act": "cut", "along": [[31.5, 2], [31.5, 45]], "depth": 0.012}]}
+    with pytest.raises(Problem, match="cannot cut"):
+        replay(*told, Simulation(solver="mesh", operation=cut), silent)
