@@ -1,5 +1,7 @@
-"""A closed triangle mesh around the thickened body, empty inside; its edges are springs, and across each one joins
-the corners that face each other, against bending."""
+"""A closed triangle mesh around the thickened body, empty inside.
+
+Its edges are springs, and across each edge one joins the corners that face each other, against bending.
+"""
 
 import numpy as np
 from scipy.spatial import Delaunay
@@ -16,8 +18,8 @@ CORNERS = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))
 
 
 def network(body: Body, modulus: float) -> Network:
-    """Its skin is as thick as a particle is wide and has this Young's modulus [Pa]: springs in all directions of a plane
-    alike have E t = 8 mu / 3 and mu = sum k L^2 / (8 A), so that sum k L^2 = 3 E t A; Poisson's ratio is 1/3.
+    """Its skin is as thick as a particle is wide and has this Young's modulus [Pa]: springs in all directions of a
+    plane alike have E t = 8 mu / 3 and mu = sum k L^2 / (8 A), so that sum k L^2 = 3 E t A; Poisson's ratio is 1/3.
 
     Raises Problem where the particles enclose nothing.
     """

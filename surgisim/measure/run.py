@@ -21,6 +21,22 @@ from surgisim.problem import Problem
 
 
 @dataclass(frozen=True)
+class OfScene:
+    """What tells of a scene alone, before anything is simulated."""
+
+    frames: Frames
+    camera: Camera
+    masks: Masks
+    inpainted: Inpainted
+    depth: Depth
+    tracks: Tracks
+    scene: Scene
+    deformation: Deformation
+    rendered: Frames
+    truth: TruthSeen | None = None
+
+
+@dataclass(frozen=True)
 class Run:
     frames: Frames
     camera: Camera

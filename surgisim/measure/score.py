@@ -21,8 +21,8 @@ from surgisim.measure.groups.simulation import simulation
 from surgisim.measure.groups.simulation_by_phase import simulation_by_phase
 from surgisim.measure.groups.tracking import tracking
 from surgisim.measure.lpips import Lpips
-from surgisim.measure.number import measured
-from surgisim.measure.run import Run
+from surgisim.measure.number import measured, number
+from surgisim.measure.run import OfScene, Run
 from surgisim.side_by_side import in_order
 
 
@@ -46,3 +46,9 @@ def score(run: Run, *, lpips: Lpips | None, first: int, progress=lambda *_: None
         groups[name] = found
         progress(len(groups), len(asked), f"{name} measured")
     return measured(groups)
+
+
+def score_scene(made: OfScene, *, lpips: Lpips | None, first: int, seed: int) -> dict[str, dict[str, Any]]:
+    """The numbers of a scene alone, and the seed it was fitted with."""
+    own = reconstruction(made, lpips, first) | {"seed": number(seed, "1", "seed of the fit")}
+    return measured({"reconstruction": own, "scene": scene_geometry(made)})

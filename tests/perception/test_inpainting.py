@@ -87,6 +87,31 @@ def test_what_is_invented_does_not_flicker():
     assert np.abs(np.diff(result.rgb[:, invented].astype(int), axis=0)).mean() < 1
 
 
+def test_a_copy_is_the_mean_of_what_was_seen_before_and_after():
+    """Noise of its own in every frame: two frames that are as far away halve its variance, and so does reading each
+    between pixels."""
+    sheet = cv2.GaussianBlur(tissue(1, SIZE), (0, 0), 2.0).astype(float)
+    noise = np.random.default_rng(0).normal(0, 6, (5, *sheet.shape))
+    rgb = np.clip(sheet + noise, 0, 255).astype(np.uint8)
+    tool = np.zeros(rgb.shape[:3], bool)
+    tool[2, 30:60, 40:70] = True
+    off = (filled(rgb, tool, margin=0).rgb[2].astype(float) - sheet)[tool[2]]
+    alone = (rgb[1].astype(float) - sheet)[tool[2]]
+    assert off.std() < 0.6 * alone.std()
+
+
+def test_what_no_frame_saw_grows_from_each_frames_own_rim():
+    """The whole sheet darkens at once; what was invented before it did does not stay bright at the rim."""
+    rgb = operated(1, SIZE)[0].repeat(6, 0)
+    tool = operated(1, SIZE)[1].repeat(6, 0)
+    dark = rgb.copy()
+    dark[3:] = dark[3:] // 2
+    result = filled(dark, tool, margin=0)
+    rim = tool[0] & ~cv2.erode(tool[0].astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool)
+    bright, late = (result.rgb[t][rim].astype(float).mean() for t in (0, 5))
+    assert late < 0.7 * bright
+
+
 def test_a_pixel_is_copied_from_no_farther_than_asked():
     rgb, tool, _ = passing()
     near, far = filled(rgb, tool, reach=1), filled(rgb, tool)

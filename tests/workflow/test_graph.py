@@ -38,9 +38,24 @@ def test_variants_share_what_they_do_not_change(tree):
     assert made["masking"] == made["inpainting"] == {"main"}
     assert made["depth"] == made["tracking"] == {"main", "near_light"}
     assert made["reconstruction"] == {"main", "no_trajectory", "no_anisotropy", "no_both", "near_light"}
-    assert made["estimation"] == set(VARIANTS) - {"no_relight"}
+    # Masses and springs have the default numbers, as no_estimation has.
+    assert made["estimation"] == set(VARIANTS) - {"no_relight", "point_cloud", "mesh"}
     assert made["simulation"] == set(VARIANTS)
     assert made["evaluation"] == made["report"] == set(VARIANTS)
+
+
+def test_the_papers_tables_ask_for_their_runs_and_for_scenes_with_several_seeds(tree):
+    jobs = tree.plan("tables")
+    made = {}
+    for stage, *where in jobs:
+        made.setdefault(stage, set()).add(tuple(where))
+    assert {variant for _, variant in made["evaluation"]} == {"main", "elastic_default", "point_cloud", "mesh"}
+    assert {variant for _, variant in made["reconstruction"]} == {"main"}
+    assert len(made["tables"]) == 1
+    terms = {"main", "no_trajectory", "no_anisotropy", "no_both"}
+    wanted = {(v, str(seed)) for v in terms for seed in range(3)} | {("near_light", "0")}
+    for rule in ("scene_again", "scene_score"):
+        assert {tuple(sorted(where)) for where in made[rule]} == {tuple(sorted(("demo", *w))) for w in wanted}
 
 
 def test_a_hundred_clips_are_planned(tree):
@@ -111,7 +126,7 @@ def test_what_a_failed_stage_left_from_before_is_not_taken_for_new(tree):
     assert not tree.plan()
 
 
-def test_the_truth_reaches_the_evaluation_and_its_page_only():
+def test_the_truth_reaches_what_measures_and_its_page_only():
     users = [
         line.split()[1].rstrip(":")
         for path in (ROOT / "workflow" / "rules").glob("*.smk")
@@ -120,7 +135,7 @@ def test_the_truth_reaches_the_evaluation_and_its_page_only():
         for line in block.splitlines()
         if line.startswith("rule ")
     ]
-    assert sorted(users) == ["evaluation", "report"]
+    assert sorted(users) == ["evaluation", "report", "scene_score"]
 
 
 def test_a_stage_reads_only_from_stages_whose_settings_count_as_its_own():
@@ -164,6 +179,8 @@ CONCEALED |= {
     "known_board",
     "ablations",
     "recorded",
+    "scene_score",
+    "tables",
 }
 AGAIN = {
     "verification",
@@ -174,6 +191,7 @@ AGAIN = {
     "clip_diagnosis_report",
     "perturbed_diagnosis",
     "drawn_diagnosis",
+    "scene_again",
 }
 """Rules that run the module of another's name."""
 ASKED_FOR = {"blind", "blind_shuffled", "blind_ablations", "blind_phases", "blind_pooled", "blind_real"}

@@ -287,3 +287,32 @@ def every(pattern):
     return lambda w: expand(
         pattern, seed=w.seed, case=range(COUNT), way=getattr(w, "way", "main")
     )
+
+
+# The paper's tables (tables.smk): variants simulated, variants of the scene alone, and seeds of its fit.
+TABLED = ("main", "elastic_default", "point_cloud", "mesh")
+TERMS = ("main", "no_trajectory", "no_anisotropy", "no_both")
+AGAIN = [0, 1, 2]
+
+
+def receipt():
+    """Digest of every stage's code, and the settings of every clip and variant that the tables show."""
+    shown = {*TABLED, *TERMS, "near_light"}
+    stages = [*MEASURED, "evaluation", "scene_score"]
+    return {
+        "code": {stage: _code(stage) for stage in stages},
+        "settings": {
+            clip: {
+                variant: {
+                    stage: json.loads(PLAN.slices[stage, clip, variant])
+                    for stage in MEASURED
+                    if variant == "main"
+                    or PLAN.slices[stage, clip, variant]
+                    != PLAN.slices[stage, clip, "main"]
+                }
+                for variant in sorted(shown)
+            }
+            for clip in PLAN.clips
+        },
+        "seeds": AGAIN,
+    }

@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from surgisim.artifacts.frames import AFTER, BETWEEN, USED
 from surgisim.measure.lpips import SMALLEST, Lpips
+from surgisim.measure.number import number
 from surgisim.measure.psnr import psnr
-from surgisim.measure.run import Run
+from surgisim.measure.run import OfScene, Run
 from surgisim.measure.ssim import ssim
 from surgisim.side_by_side import in_order
 
@@ -17,6 +19,9 @@ WHEN = {
     "between": (BETWEEN, "frames held out between used ones"),
     "after": (AFTER, "frames held out after the used ones"),
 }
+"""Parts of the split, their codes and words."""
+Part = tuple[np.ndarray, str]
+"""Which frames, (T,) bool, and what they are called."""
 BLACK = "every other pixel black in both pictures"
 
 
@@ -42,7 +47,32 @@ class Pictures:
         yield "lpips", "1", self.lpips, self.lpips_why_not
 
 
-def pictures(drawn: np.ndarray, run: Run, lpips: Lpips | None) -> Pictures:
+def parts_of(split: np.ndarray) -> dict[str, Part]:
+    """Parts of the split, (T,)."""
+    return {name: (split == code, words) for name, (code, words) in WHEN.items()}
+
+
+def table(drawn: Pictures, parts: dict[str, Part]) -> dict[str, dict[str, Any]]:
+    """PSNR, SSIM and LPIPS over each part, as `psnr_PART` and so on."""
+    numbers = {}
+    for name, unit, each, why_not in drawn.columns():
+        for part, (here, words) in parts.items():
+            numbers[f"{name}_{part}"] = number(
+                mean(each[here]) if each is not None else None,
+                unit,
+                f"mean over {words} of the frame's value; {drawn.protocol[name]}",
+                series=each if part == "between" else None,
+                why_not=why_not or f"there are no {words}",
+            )
+    return numbers
+
+
+def mean(each: np.ndarray) -> float | None:
+    """None of nothing, and where a frame has no value."""
+    return float(np.mean(each)) if len(each) and np.isfinite(each).all() else None
+
+
+def pictures(drawn: np.ndarray, run: Run | OfScene, lpips: Lpips | None) -> Pictures:
     """Drawn frames, sRGB, (T, H, W, 3) uint8, against the run's recording."""
     triples = list(zip(drawn, run.frames.rgb, run.masks.tissue, strict=True))
     why_not = ""

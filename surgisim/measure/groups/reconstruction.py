@@ -4,14 +4,15 @@ from typing import Any
 
 import numpy as np
 
-from surgisim.measure.groups.pictures import WHEN, Pictures, pictures
+from surgisim.artifacts.frames import BETWEEN
+from surgisim.measure.groups.pictures import WHEN, mean, parts_of, pictures, table
 from surgisim.measure.lpips import Lpips
 from surgisim.measure.number import number
 from surgisim.measure.psnr import psnr
-from surgisim.measure.run import Run
+from surgisim.measure.run import OfScene, Run
 
 
-def reconstruction(run: Run, lpips: Lpips | None, first: int) -> dict[str, dict[str, Any]]:
+def reconstruction(run: Run | OfScene, lpips: Lpips | None, first: int) -> dict[str, dict[str, Any]]:
     radii = np.exp(run.scene.scale.astype(np.float64))
     stretch = radii.max(1) / radii.min(1)
     drawn = pictures(run.rendered.rgb, run, lpips)
@@ -20,47 +21,53 @@ def reconstruction(run: Run, lpips: Lpips | None, first: int) -> dict[str, dict[
         "gaussians": number(len(run.scene.mean), "1", "splats of the canonical scene"),
         "stretch_median": number(np.median(stretch), "1", "longest over shortest radius of a splat, median"),
         "stretch_95": number(np.percentile(stretch, 95), "1", "the same, 95th percentile"),
-        f"psnr_first_{count}": number(
-            np.mean(drawn.psnr[:count]), "dB", f"mean over the first {count} frames, used or not; tissue pixels"
-        ),
     }
     if run.truth is not None:
         each = [psnr(a, b, ~m) for a, b, m in zip(run.rendered.rgb, run.frames.rgb, run.truth.tool, strict=True)]
         numbers["psnr_between_true_mask"] = number(
-            _mean(np.array(each)[run.frames.split == 1]),
+            mean(np.array(each)[run.frames.split == 1]),
             "dB",
             "held out between used frames; all but true tool pixels",
         )
-    return numbers | table(drawn, run, WHEN) | still(run)
+    early = {f"first_{count}": (np.arange(len(run.frames.rgb)) < count, f"the first {count} frames, used or not")}
+    return numbers | table(drawn, parts_of(run.frames.split) | early) | _otherwise(run) | still(run)
 
 
-def still(run: Run) -> dict[str, dict[str, Any]]:
+def _otherwise(run: Run | OfScene) -> dict[str, dict[str, Any]]:
+    """PSNR between used frames as others count it."""
+    between = np.flatnonzero(run.frames.split == BETWEEN)
+    outside = ~run.masks.tool[between]
+    pairs = [(run.rendered.rgb[t], run.frames.rgb[t]) for t in between]
+    everywhere = np.ones(outside.shape[1:], bool)
+    ways = {
+        "outside": (
+            [psnr(*pair, here) for pair, here in zip(pairs, outside, strict=True)],
+            "all pixels but the instrument's, its rim and highlights too",
+        ),
+        "black": (
+            [psnr(*(p * m[..., None] for p in pair), everywhere) for pair, m in zip(pairs, outside, strict=True)],
+            "whole frames with the instrument black in both, as EndoNeRF's evaluation and what follows it count",
+        ),
+    }
+    return {
+        f"psnr_between_{name}": number(
+            mean(np.array(each)),
+            "dB",
+            f"mean over {WHEN['between'][1]}; {words}",
+            why_not=f"there are no {WHEN['between'][1]}",
+        )
+        for name, (each, words) in ways.items()
+    }
+
+
+def still(run: Run | OfScene) -> dict[str, dict[str, Any]]:
     """What a frozen first frame would score: the number to beat."""
     first, tissue = run.inpainted.rgb[0], run.masks.tissue
     each = np.array([psnr(first, f, m) for f, m in zip(run.frames.rgb, tissue, strict=True)])
     return {
         f"still_psnr_{when}": number(
-            _mean(each[run.frames.split == code]), "dB", f"the inpainted frame 0 held still, {words}; tissue pixels"
+            mean(each[run.frames.split == code]), "dB", f"the inpainted frame 0 held still, {words}; tissue pixels"
         )
         for when, (code, words) in WHEN.items()
         if when != "used"
     }
-
-
-def table(drawn: Pictures, run: Run, when: dict[str, tuple[int, str]]) -> dict[str, dict[str, Any]]:
-    """PSNR, SSIM and LPIPS over each part of the split."""
-    numbers = {}
-    for name, unit, each, why_not in drawn.columns():
-        for part, (code, words) in when.items():
-            numbers[f"{name}_{part}"] = number(
-                _mean(each[run.frames.split == code]) if each is not None else None,
-                unit,
-                f"mean over {words} of the frame's value; {drawn.protocol[name]}",
-                series=each if part == "between" else None,
-                why_not=why_not or f"there are no {words}",
-            )
-    return numbers
-
-
-def _mean(each: np.ndarray) -> float | None:
-    return float(np.mean(each)) if len(each) and np.isfinite(each).all() else None

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from surgisim.artifacts.frames import USED
+from surgisim.measure.groups.pictures import Part
 from surgisim.measure.moved import LEAST, MOVED, moved_region
 from surgisim.measure.number import number
 from surgisim.measure.phases import phases
@@ -18,18 +19,25 @@ REGION = (
 WHOLE = "all pixels outside the instrument, highlights and background too; the paper, which does not publish its mask"
 
 
+def by_grip(run: Run) -> dict[str, Part]:
+    """Held-out frames with a grip that has begun to pull, and after it."""
+    phase, unseen = phases(run.motion), run.frames.split != USED
+    return {
+        "driven": (unseen & np.isin(phase, ["load", "hold"]), "held-out frames in which a grip holds"),
+        "free": (unseen & (phase == "released"), "held-out frames after the grip lets go"),
+    }
+
+
 def replay_pictures(run: Run) -> dict[str, dict[str, Any]]:
     """PSNR of the moved region, held-out frames while a grip holds and free ones apart, and of whole frames."""
-    phase, split = phases(run.motion), run.frames.split
     masks = {
         "moved": (run.masks.tissue & moved_region(run.replay, run.body, run.camera), REGION),
         "whole": (~run.masks.tool, f"{WHOLE}, prints 22.455 (elastic 22.367) over its five EndoNeRF clips"),
     }
-    driven, free = np.isin(phase, ["load", "hold"]), phase == "released"
+    split = run.frames.split
     parts = {
         "used": (split == USED, "used frames but frame 0"),
-        "driven": ((split != USED) & driven, "held-out frames in which a grip holds"),
-        "free": ((split != USED) & free, "held-out frames after the grip lets go"),
+        **by_grip(run),
         "all": (np.ones(len(split), bool), "all frames but frame 0"),
     }
     numbers = {}

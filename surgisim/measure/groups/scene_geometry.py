@@ -16,7 +16,7 @@ from surgisim.measure.compared import OF_MOVING, from_start, moving
 from surgisim.measure.groups.depth_change import sampled
 from surgisim.measure.number import number, ranged
 from surgisim.measure.resample import ratio
-from surgisim.measure.run import Run
+from surgisim.measure.run import OfScene, Run
 
 FRAMES = 24
 """Frames that are looked at, evenly through the clip."""
@@ -33,7 +33,7 @@ SPIKE = 4.0
 """Times the median of all splats' longest radii from which one is a spike."""
 
 
-def scene_geometry(run: Run) -> dict[str, dict[str, Any]]:
+def scene_geometry(run: Run | OfScene) -> dict[str, dict[str, Any]]:
     """Of the canonical scene and of where its field carries it."""
     numbers = _against(run, run.tracks.xy, run.tracks.visible, "motion", "tracks") | _of_neighbours(run) | _at_rest(run)
     # The field is told where the surface was seen to go, by what tracks ride on: only the truth tells whether it is so.
@@ -42,7 +42,9 @@ def scene_geometry(run: Run) -> dict[str, dict[str, Any]]:
     return numbers
 
 
-def _against(run: Run, xy: np.ndarray, visible: np.ndarray, name: str, what: str) -> dict[str, dict[str, Any]]:
+def _against(
+    run: Run | OfScene, xy: np.ndarray, visible: np.ndarray, name: str, what: str
+) -> dict[str, dict[str, Any]]:
     """Where the field carries points, and where they are: xy (K, T, 2) [px], visible (K, T)."""
     camera, field = run.camera, load_field(run.deformation)
     rest = camera.lift(xy[:, 0].astype(float), sampled(run.depth.z[:1].astype(float), xy[:, :1])[:, 0])
@@ -76,7 +78,7 @@ def _against(run: Run, xy: np.ndarray, visible: np.ndarray, name: str, what: str
     }
 
 
-def _of_neighbours(run: Run) -> dict[str, dict[str, Any]]:
+def _of_neighbours(run: Run | OfScene) -> dict[str, dict[str, Any]]:
     """How the surface's splats move beside each other."""
     scene, camera, field = run.scene, run.camera, load_field(run.deformation)
     rest = scene.mean[expit(scene.opacity) > OPAQUE].astype(float)
@@ -101,7 +103,7 @@ def _of_neighbours(run: Run) -> dict[str, dict[str, Any]]:
     }
 
 
-def _at_rest(run: Run) -> dict[str, dict[str, Any]]:
+def _at_rest(run: Run | OfScene) -> dict[str, dict[str, Any]]:
     """Splats of the canonical scene that lie before the surface, or stick out of it."""
     scene, z = run.scene, run.depth.z[0].astype(float)
     row, column = np.clip(run.camera.project(scene.mean.astype(float))[:, ::-1].T, 0, np.array(z.shape)[:, None] - 1)

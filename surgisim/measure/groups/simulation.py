@@ -8,9 +8,8 @@ from surgisim.artifacts.frames import AFTER, USED
 from surgisim.measure.compared import OF_MOVING, compared
 from surgisim.measure.distance import distance, distance_over_time
 from surgisim.measure.groups.masking import NO_TRUTH
-from surgisim.measure.groups.pictures import WHEN, pictures
-from surgisim.measure.groups.reconstruction import table
-from surgisim.measure.groups.replay_pictures import replay_pictures
+from surgisim.measure.groups.pictures import parts_of, pictures, table
+from surgisim.measure.groups.replay_pictures import by_grip, replay_pictures
 from surgisim.measure.lpips import Lpips
 from surgisim.measure.number import number
 from surgisim.measure.reference import Reference, tracked, true
@@ -35,7 +34,8 @@ def simulation(run: Run, lpips: Lpips | None) -> dict[str, dict[str, Any]]:
         return _stated(run) | {"tracked_held_out": number(None, run.length_unit, "", why_not=why_not)}
     numbers = _compared(run, tracked(run)) | _true(run) | _stated(run)
     if len(run.replay.rgb) == len(run.frames.rgb):
-        numbers |= table(pictures(run.replay.rgb, run, lpips), run, WHEN) | replay_pictures(run)
+        drawn = pictures(run.replay.rgb, run, lpips)
+        numbers |= table(drawn, parts_of(run.frames.split) | by_grip(run)) | replay_pictures(run)
     else:
         numbers["psnr_between"] = number(None, "dB", "", why_not="the replay was not rendered frame by frame")
     return numbers

@@ -1,9 +1,9 @@
 """Fill what the instrument hides from frames that saw it, following the tissue; then invent the rest, once.
 
 Tissue hidden now was, or will be, seen: the motion of the tissue around the instrument is continued behind it
-and followed from frame to frame until the pixel is in view. Copies are lit like the rim of the hole they fill.
-What no frame ever saw is grown inward from the rim in one frame and carried from there to the others, so that it
-does not flicker.
+and followed from frame to frame until the pixel is in view, in both directions. Copies are lit like the rim of the
+hole they fill. What no frame ever saw is grown inward from the rim in one frame and carried from there to the others,
+so that it does not flicker; near the rim it is what grows from each frame's own.
 """
 
 from collections.abc import Callable
@@ -20,6 +20,10 @@ from surgisim.perception.inpainting.source import Source, behind, followed, seen
 from surgisim.perception.tracking.between import sample
 from surgisim.side_by_side import in_order
 
+RIM = 0.04
+"""How far from known tissue a hole's edges tell [longest side]."""
+TELEA = 0.03
+"""How far around a pixel its edges are looked for [longest side]."""
 Invent = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -36,9 +40,16 @@ def fill_with(rgb, hole, settings: Inpainting, progress, *, invent: Invent) -> t
     filled, known = rgb.copy(), ~hole
 
     def copies(t: int) -> tuple[np.ndarray, np.ndarray]:
-        source = _nearer(earlier[t], later[t], t, settings.reach)
-        copied = hole[t] & source.found
-        return copied, _lit_alike(rgb, hole, source, t, copied)
+        colors, weight = np.zeros(rgb.shape[1:], np.float32), np.zeros(hole.shape[1:], np.float32)
+        for source in (earlier[t], later[t]):
+            away = abs(source.frame - t)
+            copied = hole[t] & source.found & (away <= settings.reach)
+            # Each step from frame to frame adds an error of its own.
+            share = 1 / np.maximum(away[copied], 1).astype(np.float32)
+            colors[copied] += share[:, None] * _lit_alike(rgb, hole, source, t, copied)
+            weight[copied] += share
+        copied = weight > 0
+        return copied, np.rint(colors[copied] / weight[copied][:, None]).astype(np.uint8)
 
     for t, (copied, colors) in enumerate(in_order(copies, zip(range(total)))):
         progress(total * (0.5 + 0.3 * t / total), total, "copying what other frames saw")
@@ -60,10 +71,15 @@ def grown_inward(frame: np.ndarray, hole: np.ndarray) -> np.ndarray:
     pad = 8
     wide = cv2.copyMakeBorder(guided, pad, pad, pad, pad, cv2.BORDER_REPLICATE)
     inner = cv2.copyMakeBorder(hole.astype(np.uint8), pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
-    edges = cv2.inpaint(wide, inner, 5, cv2.INPAINT_TELEA)[pad:-pad, pad:-pad].astype(np.float32)
-    away = cv2.distanceTransform(hole.astype(np.uint8), cv2.DIST_L2, 5) / (0.04 * max(hole.shape))
-    share = np.clip(1 - away, 0, 1)[..., None]
+    edges = cv2.inpaint(wide, inner, TELEA * max(hole.shape), cv2.INPAINT_TELEA)[pad:-pad, pad:-pad].astype(np.float32)
+    share = _near_rim(hole)[..., None]
     return np.where(hole[..., None], np.rint(share * edges + (1 - share) * smooth), frame).astype(np.uint8)
+
+
+def _near_rim(hole: np.ndarray) -> np.ndarray:
+    """1 at the rim of a hole, falling to 0 inside it, (H, W)."""
+    away = cv2.distanceTransform(hole.astype(np.uint8), cv2.DIST_L2, 5) / (RIM * max(hole.shape))
+    return np.clip(1 - away, 0, 1)
 
 
 def _tissue_motion(rgb, hole, progress) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -100,22 +116,13 @@ def _swept(order, flow: list[np.ndarray], hole: np.ndarray) -> dict[int, Source]
     return sources
 
 
-def _nearer(earlier: Source, later: Source, t: int, reach: int) -> Source:
-    """Of two sources the one fewer frames away, (none beyond `reach`)."""
-    away = [np.where(s.found & (abs(s.frame - t) <= reach), abs(s.frame - t), 1 << 20) for s in (earlier, later)]
-    second = away[1] < away[0]
-    frame = np.where(second, later.frame, earlier.frame)
-    frame = np.where(np.minimum(*away) >= 1 << 20, -1, frame)
-    return Source(frame, np.where(second[..., None], later.xy, earlier.xy))
-
-
 def _lit_alike(rgb, hole, source: Source, t: int, copied: np.ndarray) -> np.ndarray:
-    """Copied colours, corrected by what the rim of the hole would have been off by, (N, 3) uint8."""
+    """Copied colours, corrected by what the rim of the hole would have been off by, (N, 3) float32."""
     colours = _looked_up(rgb, source, copied)
     frame, xy = source.frame, source.xy
     ring = cv2.dilate(copied.astype(np.uint8), np.ones((9, 9), np.uint8)).astype(bool) & ~hole[t]
     if not ring.any():
-        return np.rint(colours).astype(np.uint8)
+        return colours
     _, label = cv2.distanceTransformWithLabels(
         (~copied).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
@@ -132,14 +139,14 @@ def _lit_alike(rgb, hole, source: Source, t: int, copied: np.ndarray) -> np.ndar
     i, j = np.rint(place[..., 1]).astype(int).clip(0, height - 1), np.rint(place[..., 0]).astype(int).clip(0, width - 1)
     ring &= ~hole[frame[y, x].clip(0), i, j]
     if not ring.any():
-        return np.rint(colours).astype(np.uint8)
+        return colours
     there = _looked_up(rgb, Source(frame[y, x], place.astype(np.float32)), ring)
     off = np.zeros((height, width, 3), np.float32)
     off[ring] = np.clip(rgb[t][ring] - there, -40, 40)
     weight = ring.astype(np.float32)
     mean = cv2.GaussianBlur(off, (0, 0), 3) / np.maximum(cv2.GaussianBlur(weight, (0, 0), 3), 1e-6)[..., None]
     correction = continued(mean, ring)[copied]
-    return np.rint(np.clip(colours + correction, 0, 255)).astype(np.uint8)
+    return np.clip(colours + correction, 0, 255)
 
 
 def _looked_up(rgb: np.ndarray, source: Source, chosen: np.ndarray) -> np.ndarray:
@@ -167,11 +174,12 @@ def _invent_into(filled, known, to_next, to_last, invent: Invent, progress) -> N
             progress(total * (0.8 + 0.2 * next(done) / (total + 1)), total, "inventing what no frame saw")
             gap = ~known[t]
             here = followed(before, flow[t], t, gap)
-            taken = gap & here.found
-            filled[t][taken] = np.rint(_looked_up(filled, here, taken)).astype(np.uint8)
-            left = gap & ~here.found
-            if left.any():
-                filled[t] = np.where(left[..., None], invent(filled[t], left), filled[t])
+            taken, left = gap & here.found, gap & ~here.found
+            if gap.any():
+                filled[t] = invent(filled[t], gap)
+                share = _near_rim(gap)[taken][:, None]
+                carried = share * filled[t][taken] + (1 - share) * _looked_up(filled, here, taken)
+                filled[t][taken] = np.rint(carried).astype(np.uint8)
             before = Source(np.where(left, t, here.frame), here.xy)
 
     for _ in in_order(onward, ((range(first + 1, total), to_last), (range(first - 1, -1, -1), to_next))):

@@ -1,0 +1,55 @@
+"""Measure a scene alone: pictures, and whether it moves as tissue does.
+
+reads   what a scene was made of and what it became, the truth where the clip was invented, benchmark files
+writes  metrics.json    Metrics, of the groups reconstruction and scene
+"""
+
+from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.deformation import Deformation
+from surgisim.artifacts.depth import Depth
+from surgisim.artifacts.frames import Frames
+from surgisim.artifacts.inpainted import Inpainted
+from surgisim.artifacts.masks import Masks
+from surgisim.artifacts.metrics import Metrics
+from surgisim.artifacts.scene import Scene
+from surgisim.artifacts.tracks import Tracks
+from surgisim.artifacts.truth import Truth
+from surgisim.config.scene_score import SceneScore
+from surgisim.stage import Maybe, Source, stage
+
+
+@stage(
+    reads={
+        "frames": Frames,
+        "camera": Camera,
+        "masks": Masks,
+        "inpainted": Inpainted,
+        "depth": Depth,
+        "tracks": Tracks,
+        "scene": Scene,
+        "deformation": Deformation,
+        "rendered": Frames,
+        "truth": Maybe(Truth),
+        "benchmarks": Source("folder of Snakemake's STAGE.tsv, or such files joined by ':'", required=False),
+    },
+    writes={"metrics": Metrics},
+    settings=SceneScore,
+)
+def main(*, truth, benchmarks, settings, progress, **artifacts):
+    from pathlib import Path
+
+    from surgisim.measure.costs import costs
+    from surgisim.measure.lpips import load_lpips
+    from surgisim.measure.run import OfScene
+    from surgisim.measure.score import score_scene
+    from surgisim.measure.truth_seen import seen
+
+    camera = artifacts["camera"]
+    made = OfScene(**artifacts, truth=truth and seen(truth, camera))
+    lpips = load_lpips(Path(settings.lpips_weights)) if settings.lpips_weights else None
+    values = score_scene(made, lpips=lpips, first=settings.first_frames, seed=settings.seed)
+    return Metrics(settings.clip or camera.source, settings.variant, values, costs(benchmarks) if benchmarks else {})
+
+
+if __name__ == "__main__":
+    main()
