@@ -14,7 +14,7 @@ from scipy import ndimage
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
-from surgisim.artifacts.ply import write_ply
+from surgisim.artifacts.ply import particles, write_ply
 from surgisim.config.thickening import Thickening
 from surgisim.gaussians.surface import Surface
 from surgisim.problem import Problem
@@ -58,10 +58,8 @@ def thicken(
 
 
 def points(body: Body) -> bytes:
-    """The body as coloured points any viewer opens: PLY with flags for surface and held particles."""
-    columns = {name: body.rest[:, i] for i, name in enumerate("xyz")}
-    color = np.rint(np.clip(body.color, 0, 1) * 255).astype(np.uint8)
-    columns |= {name: color[:, i] for i, name in enumerate(("red", "green", "blue"))}
+    """The body as coloured points or splats that any viewer opens: PLY with flags for surface and held particles."""
+    columns = particles(body.rest, body.volume, body.color)
     columns |= {"surface": body.surface.astype(np.uint8), "held": body.held.astype(np.uint8)}
     return write_ply(columns, {"kind": "Points", "units": {"x": "m"}})
 

@@ -8,6 +8,10 @@ import numpy as np
 
 from surgisim.problem import Problem
 
+DC = 0.28209479177387814
+"""Value of the constant spherical harmonic: colour = 0.5 + DC * f_dc."""
+SOLID = 0.95
+"""Opacity of a particle drawn as a splat."""
 TYPES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int"}
 NAMES = {v: k for k, v in TYPES.items()} | {"float32": "f4", "float64": "f8", "uint8": "u1", "int32": "i4"}
 
@@ -48,3 +52,28 @@ def read_ply(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         raise Problem(f"{path}: is cut short; {count} vertices are announced. Run the stage that makes it again.")
     table = np.frombuffer(body, dtype, count)
     return {name: table[name].copy() for name in dtype.names or ()}, header
+
+
+def splats(
+    mean: np.ndarray, opacity: np.ndarray, scale: np.ndarray, rotation: np.ndarray, color: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Columns of G Gaussians in the layout that viewers of splats read: centres [m], (G, 3), logits of opacity, (G,),
+    logarithms of radii [m], (G, 3), quaternions w, x, y, z, (G, 4), and colours, sRGB 0-1, (G, 3)."""
+    f4 = np.float32
+    columns = {name: mean[:, i].astype(f4) for i, name in enumerate("xyz")}
+    columns |= {name: np.zeros(len(mean), f4) for name in ("nx", "ny", "nz")}
+    columns |= {f"f_dc_{i}": ((color[:, i] - 0.5) / DC).astype(f4) for i in range(3)}
+    columns["opacity"] = opacity.astype(f4)
+    columns |= {f"scale_{i}": scale[:, i].astype(f4) for i in range(3)}
+    return columns | {f"rot_{i}": rotation[:, i].astype(f4) for i in range(4)}
+
+
+def particles(place: np.ndarray, volume: np.ndarray, color: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of P particles, which viewers of points open as coloured points and viewers of splats as round splats as
+    wide as they are: places [m], (P, 3), volumes [m^3], (P,), colours, sRGB 0-1, (P, 3)."""
+    count = len(place)
+    radius = np.repeat(np.log(0.5 * np.cbrt(volume.astype(float)))[:, None], 3, 1)
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
+    columns = splats(place, np.full(count, np.log(SOLID / (1 - SOLID))), radius, upright, color)
+    rounded = np.rint(np.clip(color, 0, 1) * 255).astype(np.uint8)
+    return columns | {name: rounded[:, k] for k, name in enumerate(("red", "green", "blue"))}

@@ -7,11 +7,8 @@ from typing import Any, Self
 import numpy as np
 
 from surgisim.artifacts.base import Artifact, _check_kind, check
-from surgisim.artifacts.ply import read_ply, write_ply
+from surgisim.artifacts.ply import DC, read_ply, splats, write_ply
 from surgisim.problem import Problem
-
-DC = 0.28209479177387814
-"""Value of the constant spherical harmonic: colour = 0.5 + DC * f_dc."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +36,7 @@ class Scene(Artifact):
         )
 
     def encode(self, header: dict[str, Any]) -> bytes:
-        f4 = np.float32
-        columns = {name: self.mean[:, i].astype(f4) for i, name in enumerate("xyz")}
-        columns |= {name: np.zeros(len(self.mean), f4) for name in ("nx", "ny", "nz")}
-        columns |= {f"f_dc_{i}": ((self.color[:, i] - 0.5) / DC).astype(f4) for i in range(3)}
-        columns["opacity"] = self.opacity.astype(f4)
-        columns |= {f"scale_{i}": self.scale[:, i].astype(f4) for i in range(3)}
-        columns |= {f"rot_{i}": self.rotation[:, i].astype(f4) for i in range(4)}
-        return write_ply(columns, header)
+        return write_ply(splats(self.mean, self.opacity, self.scale, self.rotation, self.color), header)
 
     @classmethod
     def decode(cls, path: Path) -> tuple[Self, dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""A replay's files for people: coloured points to turn in a viewer, and one picture column over time."""
+"""A replay's files for people: coloured points or splats to turn in a viewer, and one picture column over time."""
 
 import cv2
 import numpy as np
@@ -6,16 +6,14 @@ import numpy as np
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
-from surgisim.artifacts.ply import write_ply
+from surgisim.artifacts.ply import particles, write_ply
 from surgisim.artifacts.replay import Replay
 from surgisim.measure.slices import slice_yt
 
 
 def final_ply(replay: Replay, body: Body) -> bytes:
     """The last frame's particles with their colours."""
-    columns = {name: replay.position[-1][:, k] for k, name in enumerate("xyz")}
-    color = np.rint(np.clip(body.color, 0, 1) * 255).astype(np.uint8)
-    columns |= {name: color[:, k] for k, name in enumerate(("red", "green", "blue"))}
+    columns = particles(replay.position[-1], body.volume, body.color)
     return write_ply(columns, {"kind": "Points", "units": {"x": "m"}, "producer": "simulation"})
 
 

@@ -22,6 +22,7 @@ FLAGS = (
     "--disable-dev-shm-usage",
     "--hide-scrollbars",
 )
+WEBGL = "--enable-unsafe-swiftshader", "--use-angle=swiftshader"
 
 
 def installed() -> bool:
@@ -31,7 +32,8 @@ def installed() -> bool:
 class Browser:
     """One window; close it by leaving the `with` block."""
 
-    def __init__(self, width: int = 1280, height: int = 900) -> None:
+    def __init__(self, width: int = 1280, height: int = 900, *, webgl: bool = False) -> None:
+        """webgl: whether pages may draw in 3D, which is slow without a GPU."""
         self.profile = tempfile.TemporaryDirectory()
         self.driver = subprocess.Popen(
             ["chromedriver", "--port=0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
@@ -41,7 +43,12 @@ class Browser:
         self.place = f"http://127.0.0.1:{port}/session"
         options = {
             "binary": shutil.which("chromium"),
-            "args": [*FLAGS, f"--user-data-dir={self.profile.name}", f"--window-size={width},{height}"],
+            "args": [
+                *FLAGS,
+                *(WEBGL if webgl else ()),
+                f"--user-data-dir={self.profile.name}",
+                f"--window-size={width},{height}",
+            ],
         }
         wanted = {"browserName": "chrome", "goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL"}}
         answer = self._call("POST", "", {"capabilities": {"alwaysMatch": wanted}})
