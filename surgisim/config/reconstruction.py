@@ -58,8 +58,9 @@ class Reconstruction(Settings):
     """Weight of the anisotropic term, 0 switches it off [1]."""
     anisotropy_largest: float = Field(1.0, gt=0)
     """r_m, largest radius [anisotropy_unit]."""
-    anisotropy_unit: float = Field(4.0, gt=0)
-    """Length r_m is counted in; the paper's scenes have no unit [median first radius]."""
+    anisotropy_unit: float = Field(0.01, gt=0)
+    """Length r_m is counted in, the paper's scenes have no unit; two median first radii where those are more [longest
+    side of the scene]."""
     anisotropy_ratio: float = Field(3.0, ge=1)
     """r_ani, largest over smallest radius [1]."""
     pooled: float = Field(1.0, ge=0)

@@ -1,5 +1,6 @@
 """The optimisation of scene and field, a frame or a few at a time."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -27,6 +28,8 @@ SPLIT = 0.1
 """Largest share of the Gaussians split at once."""
 WIDEST = 10.0
 """Largest radius kept [median first radius]."""
+SMALLEST_UNIT = 2.0
+"""What r_m is counted in at least [median first radius]: a scene of few Gaussians still has to be closed."""
 TRAJECTORY_EVERY = 2
 """Iterations from one to the next that counts the trajectory term, as many times over: it costs as much as the whole
 field once more."""
@@ -37,6 +40,8 @@ WEIGHED_EVERY = 2
 that once more."""
 MIDWAY_EVERY = 8
 """Iterations from one to the next that looks at a frame of which nothing is seen."""
+MOST_OF_IT = 0.5, 99.5
+"""Percentiles of the centres between which the scene's box lies [%]."""
 REPORTS = 100
 """Rows of the history."""
 
@@ -54,6 +59,8 @@ class Fit:
         self.unseen = np.setdiff1d(np.arange(seen.frame[-1]), seen.frame) / camera.fps
         self.field = first_field(start.mean, camera, length, settings, self.rng).on(self.device)
         self.radius = float(np.exp(np.median(start.scale)))
+        side = np.ptp(np.percentile(start.mean, MOST_OF_IT, axis=0), axis=0).max()
+        self.unit = max(settings.anisotropy_unit * side, SMALLEST_UNIT * self.radius)
         self.most = min(settings.most_gaussians, int(settings.growth * len(start.mean)))
         self.middle = float(np.median(start.mean[:, 2]))
         self.head = [f"head_{i}" for i in range(len(self.field.head))]
@@ -162,6 +169,8 @@ class Fit:
             for name in self.head:
                 adam.tensors[name].grad = torch.zeros_like(adam.tensors[name])
         adam.advance(rate_at(iteration, self.settings.iterations, self.settings.rate_end))
+        if canonical:
+            self.bound()
         if recorded:
             self.record.add(probe.grad, image.weight)
         whole = seen.weight == 1
@@ -197,9 +206,8 @@ class Fit:
         settings, times = self.settings, seen.frame / self.camera.fps
         total = radius.new_zeros(())
         if settings.anisotropy:
-            unit = settings.anisotropy_unit * self.radius
             limits = {"r_m": settings.anisotropy_largest, "r_ani": settings.anisotropy_ratio}
-            total = total + settings.anisotropy * anisotropic(radius.flatten(0, 1), unit=unit, **limits)
+            total = total + settings.anisotropy * anisotropic(radius.flatten(0, 1), unit=self.unit, **limits)
         if phase.moves_field and iteration % SMOOTHED_EVERY == 0:
             space, rough = field.roughness()
             smoothness = settings.smoothness_space * space + settings.smoothness_time * rough
@@ -233,6 +241,17 @@ class Fit:
         with torch.no_grad():
             first, last = field.at(mean, [before, after])[0]
         return (field(mean, time)[0] - torch.lerp(first, last, share)).norm(dim=1).mean() / self.radius
+
+    @torch.no_grad()
+    def bound(self) -> None:
+        """Splats of the canonical scene have colours that are some, and are no larger or thinner than what the
+        anisotropic term asks for on average."""
+        # Viewers show a splat that is brighter than white as a dark speck.
+        self.adam.tensors["color"].clamp_(0, 1)
+        if self.settings.anisotropy:
+            scale = self.adam.tensors["scale"]
+            scale.clamp_(max=math.log(self.settings.anisotropy_largest * self.unit))
+            scale.clamp_(min=scale.amax(1, keepdim=True) - math.log(self.settings.anisotropy_ratio))
 
     def astray(self, moved: torch.Tensor, seen: Observations) -> torch.Tensor:
         """How far the field carries Gaussians past where the surface was seen to go; the scene at rest stays."""
@@ -278,7 +297,7 @@ def first_field(
     mean: np.ndarray, camera: Camera, length: int, settings: Reconstruction, rng: np.random.Generator
 ) -> Field:
     """A still field over the scene's box and the clip's time; outliers lie outside the box and read its border."""
-    low, high = np.percentile(mean, [0.5, 99.5], axis=0).astype(float)
+    low, high = np.percentile(mean, MOST_OF_IT, axis=0).astype(float)
     room = 0.02 * (high - low) + 1e-3 * np.max(high - low)
     low, high = low - room, high + room
     share = (high - low) / np.max(high - low)

@@ -119,7 +119,7 @@ def _simulations(runs: dict[tuple, Metrics]) -> Table:
 
 
 def _environments(scenes: dict[tuple, Metrics]) -> Table:
-    names, geometry = [f"{kind}_first_25" for kind, _ in KINDS], ("strain_95", "folded", "spikes")
+    names, geometry = [f"{kind}_first_25" for kind, _ in KINDS], ("strain_95", "folded", "spikes", "largest", "stretch")
     rows, apart = [], {}
     for variant, words in ENVIRONMENT.items():
         mine = [one for (_, v, _), one in scenes.items() if v == variant]
@@ -147,6 +147,8 @@ def _environments(scenes: dict[tuple, Metrics]) -> Table:
             "strain of neighbours, 95th percentile",
             "surface turned over [%]",
             "splats that stick out [%]",
+            "largest splat [% of the scene]",
+            "thinnest splat, longest over shortest radius",
         ],
         "rows": rows,
         "printed": [_printed(name, list(v), v) for name, v in PRINTED_ENVIRONMENT.items()],

@@ -66,3 +66,6 @@ def test_splats_that_float_or_bristle_are_counted(run):
     opacity = 1 / (1 + np.exp(-run.scene.opacity.astype(float)))
     assert told["floating"] == pytest.approx(100 * opacity[:count].sum() / opacity.sum(), abs=1.0)
     assert told["spikes"] == pytest.approx(100 * count / len(mean), abs=0.1)
+    side = np.ptp(np.percentile(mean, [0.5, 99.5], axis=0), axis=0).max()
+    assert told["largest"] == pytest.approx(100 * np.exp(scale[:, 0].max()) / side, rel=1e-4)
+    assert told["stretch"] == pytest.approx(np.exp(np.ptp(scale, axis=1).max()), rel=1e-4)

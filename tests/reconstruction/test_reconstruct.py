@@ -120,6 +120,29 @@ def test_history_tells_every_phase_and_keeps_the_bound(clip, done):
     assert history[-5:, 2].mean() > history[:5, 2].mean()
 
 
+def test_no_splat_is_brighter_than_white_or_larger_or_thinner_than_asked(clip, done, fit):
+    """This scene's first splats are wide, so that r_m is counted in their radii."""
+    radii = np.exp(done.scene.scale)
+    assert done.scene.color.min() >= 0
+    assert done.scene.color.max() <= 1
+    assert radii.max() <= 2 * fit.radius * clip.settings.anisotropy_largest * 1.001
+    assert (radii.max(1) / radii.min(1)).max() <= clip.settings.anisotropy_ratio * 1.001
+
+
+def test_without_the_anisotropic_term_shape_is_free(clip, fit):
+    for name, value in ("scale", [0.0, -8.0, -8.0]), ("color", [1.5, 0.5, -0.5]):
+        fit.adam.tensors[name][:] = torch.tensor(value)
+    fit.settings = clip.settings.model_copy(update={"anisotropy": 0.0})
+    fit.bound()
+    assert torch.equal(fit.adam.tensors["scale"][0], torch.tensor([0.0, -8.0, -8.0]))
+    assert torch.equal(fit.adam.tensors["color"][0], torch.tensor([1.0, 0.5, 0.0]))
+    fit.settings = clip.settings
+    fit.bound()
+    largest, _, smallest = fit.adam.tensors["scale"][0].exp()
+    assert largest == pytest.approx(fit.unit, rel=1e-5)
+    assert smallest == pytest.approx(fit.unit / clip.settings.anisotropy_ratio, rel=1e-5)
+
+
 @pytest.mark.parametrize("phase", PHASES, ids=lambda p: p.name)
 def test_a_phase_moves_what_it_says_and_nothing_else(fit, phase):
     fit.step(PHASES[0], [5], 0)

@@ -108,13 +108,17 @@ def _at_rest(run: Run | OfScene) -> dict[str, dict[str, Any]]:
     scene, z = run.scene, run.depth.z[0].astype(float)
     row, column = np.clip(run.camera.project(scene.mean.astype(float))[:, ::-1].T, 0, np.array(z.shape)[:, None] - 1)
     surface = map_coordinates(z, [row, column], order=1)
-    opacity, longest = expit(scene.opacity.astype(float)), np.exp(scene.scale.astype(float)).max(1)
+    opacity, radii = expit(scene.opacity.astype(float)), np.exp(scene.scale.astype(float))
+    longest, side = radii.max(1), np.ptp(np.percentile(scene.mean, [0.5, 99.5], axis=0), axis=0).max()
     floats = scene.mean[:, 2] < (1 - BEFORE) * surface
     before = f"share of all opacity that lies before the depth of frame 0 by more than {BEFORE:.0%} of its distance"
     long = f"splats whose longest radius is over {SPIKE:g} times the median one"
+    most = "longest radius of any splat, over the longest side of the box that holds 99 % of the centres"
     return {
         "floating": number(100 * opacity[floats].sum() / opacity.sum(), "%", before),
         "spikes": number(100 * (longest > SPIKE * np.median(longest)).mean(), "%", long),
+        "largest": number(100 * longest.max() / side, "%", most),
+        "stretch": number((longest / radii.min(1)).max(), "1", "longest radius over the shortest, of the worst splat"),
     }
 
 
