@@ -18,6 +18,7 @@ from surgisim.artifacts.ply import particles, write_ply
 from surgisim.config.thickening import Thickening
 from surgisim.gaussians.surface import Surface
 from surgisim.problem import Problem
+from surgisim.skin import normals, skin, width
 
 LAYERS = 1000
 """Layers of the printed algorithm."""
@@ -62,6 +63,21 @@ def points(body: Body) -> bytes:
     columns = particles(body.rest, body.volume, body.color)
     columns |= {"surface": body.surface.astype(np.uint8), "held": body.held.astype(np.uint8)}
     return write_ply(columns, {"kind": "Points", "units": {"x": "m"}})
+
+
+def mesh(body: Body) -> bytes:
+    """The body's closed surface as a PLY of coloured triangles, which programs that mesh or print take: half a particle
+    outside the outermost centres, so that it encloses the particles' volume."""
+    corners, faces = np.unique(skin(body), return_inverse=True)
+    faces = faces.reshape(-1, 3)
+    centers = body.rest[corners].astype(float)
+    out = normals(centers, faces)
+    place = centers + 0.5 * width(body) * out
+    columns = {name: place[:, k].astype(np.float32) for k, name in enumerate("xyz")}
+    columns |= {f"n{name}": out[:, k].astype(np.float32) for k, name in enumerate("xyz")}
+    rounded = np.rint(np.clip(body.color[corners], 0, 1) * 255).astype(np.uint8)
+    columns |= {name: rounded[:, k] for k, name in enumerate(("red", "green", "blue"))}
+    return write_ply(columns, {"kind": "Mesh", "units": {"x": "m"}}, faces)
 
 
 def bounding_box(surface: Surface, camera: Camera) -> tuple[np.ndarray, np.ndarray]:

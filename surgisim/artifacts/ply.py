@@ -1,4 +1,4 @@
-"""Binary PLY of one vertex element: what any viewer opens."""
+"""Binary PLY of vertices, and of triangles between them: what any viewer opens."""
 
 import json
 from pathlib import Path
@@ -16,8 +16,9 @@ TYPES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int"}
 NAMES = {v: k for k, v in TYPES.items()} | {"float32": "f4", "float64": "f8", "uint8": "u1", "int32": "i4"}
 
 
-def write_ply(columns: dict[str, np.ndarray], header: dict[str, Any]) -> bytes:
-    """Bytes of a little-endian PLY; one property a column, the artifact's header as a comment."""
+def write_ply(columns: dict[str, np.ndarray], header: dict[str, Any], faces: np.ndarray | None = None) -> bytes:
+    """Bytes of a little-endian PLY; one property a column, the artifact's header as a comment; faces: triangles
+    between vertices, (F, 3) int."""
     dtype = np.dtype([(name, np.asarray(c).dtype.newbyteorder("<")) for name, c in columns.items()])
     table = np.empty(len(next(iter(columns.values()))), dtype)
     for name, column in columns.items():
@@ -25,7 +26,13 @@ def write_ply(columns: dict[str, np.ndarray], header: dict[str, Any]) -> bytes:
     lines = ["ply", "format binary_little_endian 1.0", f"comment surgisim {json.dumps(header, sort_keys=True)}"]
     lines.append(f"element vertex {len(table)}")
     lines += [f"property {TYPES[dtype[name].str[1:]]} {name}" for name in columns]
-    return ("\n".join([*lines, "end_header"]) + "\n").encode() + table.tobytes()
+    listed = b""
+    if faces is not None:
+        lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+        rows = np.empty(len(faces), np.dtype([("count", "u1"), ("corners", "<i4", 3)]))
+        rows["count"], rows["corners"] = 3, faces
+        listed = rows.tobytes()
+    return ("\n".join([*lines, "end_header"]) + "\n").encode() + table.tobytes() + listed
 
 
 def read_ply(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:

@@ -9,14 +9,14 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.scene import Scene
 from surgisim.gaussians.attributes import drawn
 from surgisim.gaussians.rasterise import render, to_bytes
-from surgisim.measure.flow_at import spacing
 from surgisim.report.charts.particles import particles
 from surgisim.report.films import Film, joined
 from surgisim.report.palette import HELD, MATERIAL, MOVED, gradient, mapped, rgb
 from surgisim.report.story import Story
 from surgisim.report.uri import jpeg
-from surgisim.report.views import View, balls, look
+from surgisim.report.views import View, look, surface
 from surgisim.side_by_side import in_order
+from surgisim.skin import skin
 
 WHITE = (1.0, 1.0, 1.0)
 
@@ -57,7 +57,7 @@ def colors(story: Story) -> np.ndarray:
 def body_views(story: Story, size: tuple[int, int]) -> dict[str, str]:
     """Caption -> figure of the thick body."""
     run = story.run
-    rest, ball = run.body.rest.astype(float), _radius(story)
+    rest = run.body.rest.astype(float)
     unit = _unit(story)
     flank = look(rest, 90, 0, size)
     grips = tuple(zip(run.motion.center_rest, run.motion.radius, strict=True))
@@ -65,11 +65,11 @@ def body_views(story: Story, size: tuple[int, int]) -> dict[str, str]:
     away, below, sideways = f"away from the camera, z [{unit}]", f"down, y [{unit}]", f"right, x [{unit}]"
     views = {
         "from the camera": particles(
-            rest, colors(story), ball, look(rest, 0, 0, size), across=sideways, down=below, grips=grips
+            rest, colors(story), story.skin, look(rest, 0, 0, size), across=sideways, down=below, grips=grips
         ),
-        "from the side": particles(rest, colors(story), ball, flank, across=away, down=below),
+        "from the side": particles(rest, colors(story), story.skin, flank, across=away, down=below),
         "cut open at the grip": particles(
-            rest[cut], colors(story)[cut], ball, flank, across=away, down=below, grips=grips
+            rest, colors(story), skin(run.body, cut), flank, across=away, down=below, grips=grips
         ),
     }
     return views
@@ -88,7 +88,7 @@ def material_views(story: Story, size: tuple[int, int]) -> dict[str, str]:
         found[str(name)] = particles(
             rest,
             mapped(column, low, high, MATERIAL).astype(float),
-            _radius(story),
+            story.skin,
             look(rest, 0, 0, size),
             across=f"right, x [{_unit(story)}]",
             down=f"down, y [{_unit(story)}]",
@@ -116,22 +116,18 @@ def side_film(story: Story, size: tuple[int, int], **how) -> Film:
     cut = section(story)
     panels = {
         "turned by 40° and lifted by 25°; held particles in pink": _frames(
-            position, np.broadcast_to(colors(story), position.shape), _radius(story), oblique
+            position, np.broadcast_to(colors(story), position.shape), story.skin, oblique
         ),
         "cut open at the grip, seen from the side: how far each particle has moved": _frames(
-            position[:, cut], mapped(moved[:, cut], 0, top, MOVED).astype(float), _radius(story), flank
+            position, mapped(moved, 0, top, MOVED).astype(float), skin(run.body, cut), flank
         ),
     }
     bar = (gradient(MOVED), "0", f"{1e3 * top:.1f}", f"displacement [{_unit(story)}]")
     return joined(panels, bar=bar, **how)
 
 
-def _frames(position: np.ndarray, color: np.ndarray, radius: float, view: View) -> np.ndarray:
-    return np.stack(list(in_order(lambda p, c: balls(p, c, radius, view), zip(position, color, strict=True))))
-
-
-def _radius(story: Story) -> float:
-    return 0.72 * spacing(story.run.body.rest)
+def _frames(position: np.ndarray, color: np.ndarray, faces: np.ndarray, view: View) -> np.ndarray:
+    return np.stack(list(in_order(lambda p, c: surface(p, faces, c, view), zip(position, color, strict=True))))
 
 
 def _unit(story: Story) -> str:

@@ -12,6 +12,7 @@ from surgisim.measure.grasp_error import release
 from surgisim.measure.phases import phases
 from surgisim.measure.run import Run
 from surgisim.report.moments import moments
+from surgisim.skin import skin
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,11 @@ class Story:
         """What the depth colours span [m]."""
         low, high = np.percentile(self.run.depth.z, [1, 99])
         return float(low), float(max(high, low + 1e-6))
+
+    @cached_property
+    def skin(self) -> np.ndarray:
+        """Triangles around the body, (F, 3) int."""
+        return skin(self.run.body)
 
     @cached_property
     def phase(self) -> np.ndarray:

@@ -1,9 +1,14 @@
-"""Particles seen from where no camera was: painted balls, the nearest in front."""
+"""Particles seen from where no camera was: as balls, or the surface around them; the nearest in front."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+
+from surgisim.skin import normals
+
+DARKEST = 0.4
+"""How bright a surface is that is looked along, as a share of one that faces who looks [1]."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,46 @@ def balls(points: np.ndarray, color: np.ndarray, radius: float, view: View) -> n
     nearest = np.full(picture.shape[:2], np.inf)
     _paint(picture, nearest, pixels, far, np.asarray(color, float), radius, max(radius * view.zoom, 0.75))
     return picture
+
+
+def surface(points: np.ndarray, faces: np.ndarray, color: np.ndarray, view: View) -> np.ndarray:
+    """Picture (H, W, 3) uint8 on white of triangles (F, 3) between points (Q, 3) in colours (Q, 3) 0-255, lit from
+    where it is looked at."""
+    points = np.asarray(points, float)
+    pixels, far = view.place(points)
+    facing = abs(normals(points, faces) @ np.cross(view.right, view.down))
+    lit = np.asarray(color, float) * (DARKEST + (1 - DARKEST) * facing[:, None])
+    picture = np.full((view.height, view.width, 3), 255, np.uint8)
+    _fill(picture, np.full(picture.shape[:2], np.inf), pixels, far, np.clip(lit, 0, 255), faces)
+    return picture
+
+
+@njit(cache=True, nogil=True)
+def _fill(picture, nearest, pixels, far, color, faces):
+    """Every pixel keeps the nearest triangle that covers it, its corners' colours mixed by how near they are."""
+    height, width = nearest.shape
+    for f in range(len(faces)):
+        a, b, c = faces[f]
+        ax, ay = pixels[a]
+        bx, by = pixels[b]
+        cx, cy = pixels[c]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if area == 0:
+            continue
+        top, bottom = max(int(np.ceil(min(ay, by, cy))), 0), min(int(np.floor(max(ay, by, cy))), height - 1)
+        left, right = max(int(np.ceil(min(ax, bx, cx))), 0), min(int(np.floor(max(ax, bx, cx))), width - 1)
+        for row in range(top, bottom + 1):
+            for column in range(left, right + 1):
+                v = ((column - ax) * (cy - ay) - (row - ay) * (cx - ax)) / area
+                w = ((bx - ax) * (row - ay) - (by - ay) * (column - ax)) / area
+                u = 1 - v - w
+                if u < 0 or v < 0 or w < 0:
+                    continue
+                skin = u * far[a] + v * far[b] + w * far[c]
+                if skin < nearest[row, column]:
+                    nearest[row, column] = skin
+                    for k in range(3):
+                        picture[row, column, k] = np.uint8(u * color[a, k] + v * color[b, k] + w * color[c, k])
 
 
 @njit(cache=True, nogil=True)

@@ -40,7 +40,7 @@ def test_the_two_stages_make_a_scene_and_a_body(clip, tmp_path):
     assert len(load(Scene, wrote["scene"]).mean) > 500
     assert load(Deformation, wrote["deformation"]).history[-1, 0] == 12
 
-    body = {"body": tmp_path / "body.npz", "points": tmp_path / "body.ply"}
+    body = {"body": tmp_path / "body.npz", "points": tmp_path / "body.ply", "mesh": tmp_path / "body_mesh.ply"}
     made = stage("thickening", {"cells": 8}, scene=wrote["scene"], camera=reads["camera"], **body)
     assert made.returncode == 0, made.stderr
     columns, _ = read_ply(body["points"])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from report.browser import Browser, installed
 from report.made_up import invent
+from slab import slab
 
 from surgisim.artifacts.metrics import Metrics
 from surgisim.artifacts.motion import Motion
@@ -23,7 +24,8 @@ from surgisim.report.headline import headline
 from surgisim.report.moments import moments
 from surgisim.report.page import page
 from surgisim.report.story import Story
-from surgisim.report.views import balls, look
+from surgisim.report.views import DARKEST, balls, look, surface
+from surgisim.skin import skin
 
 COST = {"masking": {"seconds": 12.5, "peak_mb": 345.0}, "depth": {"seconds": 3.0}}
 LOST = Motion(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 12, 3)), np.zeros((0, 12), bool), np.zeros(0), "none")
@@ -105,6 +107,25 @@ def test_the_nearer_ball_hides_the_farther_one():
     x, y = np.rint(pixels[0]).astype(int)
     assert picture[y, x].argmax() == 0
     assert not (picture.reshape(-1, 3).argmax(1) == 2).any() or picture.min() == 0
+
+
+@pytest.mark.parametrize("yaw", [0, 30, 60])
+def test_the_nearer_side_of_a_closed_surface_hides_the_farther_one(yaw):
+    """A box whose front is red and whose back is blue, as bright as its front faces who looks."""
+    body = slab()
+    red, blue = [200.0, 0, 0], [0, 0, 200.0]
+    color = np.where((body.rest[:, 2] < 0.0685)[:, None], red, blue)
+    view = look(body.rest.astype(float), yaw, 0, (120, 90))
+    picture = surface(body.rest, skin(body), color, view)
+    front = np.array([[0.0, 0.0, body.rest[:, 2].min()]])
+    x, y = np.rint(view.place(front)[0][0]).astype(int)
+    bright = DARKEST + (1 - DARKEST) * np.cos(np.radians(yaw))
+    assert picture[y, x] == pytest.approx([200 * bright, 0, 0], abs=4)
+    assert (picture[0, 0] == 255).all()
+    # Without holes: in each row nothing is white between what is tissue.
+    tissue = (picture < 255).any(2)
+    for row in tissue[tissue.any(1)]:
+        assert row[np.flatnonzero(row)[0] : np.flatnonzero(row)[-1] + 1].all()
 
 
 def test_the_summary_marks_the_best_of_a_row(made):

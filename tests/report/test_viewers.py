@@ -18,7 +18,7 @@ from slab import slab
 from surgisim.artifacts.replay import Replay
 from surgisim.artifacts.scene import Scene
 from surgisim.simulation.outputs import final_ply
-from surgisim.thickening import points
+from surgisim.thickening import mesh, points
 
 PACKAGES = "@mkkellogg/gaussian-splats-3d@0.4.7", "three@0.180.0"
 PAGE = """<!doctype html><style>html, body { margin: 0; height: 100%; background: #000 }</style>
@@ -120,3 +120,12 @@ def test_open3d_reads_them(files, name):
     assert cloud.has_colors() == (name != "scene")
     splats = open3d.t.io.read_point_cloud(str(file)).point
     assert {"opacity", "scale", "rot", "f_dc"} <= set(splats)
+
+
+def test_open3d_finds_the_bodys_mesh_watertight(tmp_path):
+    open3d = pytest.importorskip("open3d", reason="NO OPEN3D: nobody opened the mesh in it.", exc_type=ImportError)
+    (tmp_path / "mesh.ply").write_bytes(mesh(slab()))
+    found = open3d.io.read_triangle_mesh(str(tmp_path / "mesh.ply"))
+    assert found.is_watertight()
+    assert found.has_vertex_colors()
+    assert found.get_volume() == pytest.approx(slab().volume.sum(), rel=0.03)

@@ -41,6 +41,7 @@ rule thickening:
     output:
         body="results/{clip}/{variant}/thickening/body.npz",
         points="results/{clip}/{variant}/thickening/body.ply",
+        mesh="results/{clip}/{variant}/thickening/body_mesh.ply",
     log:
         "logs/{clip}/{variant}/thickening.log",
     benchmark:
@@ -54,5 +55,6 @@ rule thickening:
         code=code("thickening"),
     shell:
         'python "$SURGISIM/stages/thickening.py"'
-        " --scene {input.scene} --camera {input.camera} --body {output.body} --points {output.points}"
+        " --scene {input.scene} --camera {input.camera}"
+        " --body {output.body} --points {output.points} --mesh {output.mesh}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"

@@ -4,13 +4,13 @@ import numpy as np
 
 from surgisim.report.charts.paper import photograph, sheet
 from surgisim.report.palette import GRIP
-from surgisim.report.views import View, balls
+from surgisim.report.views import View, surface
 
 
 def particles(
     points: np.ndarray,
     color: np.ndarray,
-    radius: float,
+    faces: np.ndarray,
     view: View,
     *,
     across: str,
@@ -18,11 +18,11 @@ def particles(
     grips: tuple[tuple[np.ndarray, float], ...] = (),
     bar: tuple[str, float, float, str] | None = None,
 ) -> str:
-    """Balls of (Q, 3) points [m] in colours 0-255; `grips` (centre [m], radius [m]) as circles.
+    """Triangles (F, 3) between points [m], (Q, 3), in colours 0-255; `grips` (centre [m], radius [m]) as circles.
 
     `across` and `down` name the axes with their unit; `bar` adds a colour bar: map, low, high, label.
     """
-    picture = balls(points, color, radius, view)
+    picture = surface(points, faces, color, view)
     inches = 3.2
     height = inches * view.height / view.width
     with sheet(inches + 0.6, height + 0.5 + (0.5 if bar else 0)) as figure:
