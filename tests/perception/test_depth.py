@@ -76,6 +76,18 @@ def test_a_slanted_view_is_found_as_slanted_as_it_is(smoke):
     assert np.allclose(slope, [0.1, -0.6], atol=0.08)
 
 
+def test_a_lamp_that_falls_off_to_the_corners_bends_a_plane_little():
+    cam = camera(96, 72, 1)
+    lattice = shading.Lattice.of(cam, 1.0)
+    falls = (lattice.ray**2).sum(-1)
+    paint = 1 + 0.1 * np.random.default_rng(0).standard_normal(lattice.shape)
+    light = 0.4 * paint * np.exp(-shading.shading(lattice, 0 * falls) - 0.6 * falls / falls.max())
+    rgb = np.rint(255 * to_srgb(np.clip(light[..., None] * [1.0, 0.6, 0.5], 0, 1))).astype(np.uint8)[None]
+    z, _ = _near_light(rgb, np.zeros(rgb.shape[:3], bool), cam)
+    # Were the lamp's fall-off depth, corners would be .3 farther in its logarithm.
+    assert np.ptp(np.log(z[0])) < 0.1
+
+
 @pytest.mark.parametrize("pull", [(0.006, -0.004, -0.004), (-0.006, -0.004, 0.0)])
 def test_tissue_that_comes_nearer_is_told_from_tissue_that_only_slides(pull):
     sheet = pull_sheet(pull=pull, frames=14, begin=2, release=9)

@@ -6,7 +6,8 @@ With w = log z on the image, X = (x - cx) / fx, Y alike and r = (X, Y, 1), that 
     log I = log rho - 2 w - 3 log |r| - 1/2 log(w_X^2 + w_Y^2 + (1 + X w_X + Y w_Y)^2)
 
 (perspective near-light shading; Prados and Faugeras, Shape from shading: a well-posed problem?, CVPR 2005).
-In frame 0 albedo and shape share the blame: what goes with the hue is albedo, what is smooth is mostly shape.
+In frame 0 albedo and shape share the blame: what goes with the hue is albedo, what goes with the square of the distance
+from the view's middle may be the lamp, what is smooth is mostly shape.
 Afterwards the albedo travels with the tissue: a change of brightness along its way is a change of distance and slant,
 and with the motion seen across the view, the instrument's too, it tells how far pulled tissue comes nearer (pull.py).
 The absolute size is not known: the median depth of frame 0 is set to a nominal one.
@@ -30,8 +31,11 @@ from surgisim.side_by_side import in_order
 
 TRUST = 0.5
 """Confidence of a well explained pixel: brightness tells changes well and shapes only roughly."""
-ALBEDO, HUE = 0.25, 0.3
-"""Spread of log albedo that hue does not explain; of the hue's coefficients."""
+ALBEDO, HUE, FALL = 0.25, 0.15, 1.0
+"""Spread of log albedo that hue does not explain; of the hue's coefficients; of how far the lamp's log brightness falls
+off from the view's middle to its corner."""
+SAMPLES = 50
+"""Pixels of as much albedo by itself as a frame has."""
 TURNS = 20
 """How often shape and albedo take turns: where tissue lies steep, six left a sixth of the slope unfound."""
 STRETCH, AFRESH = 16, 3
@@ -177,14 +181,17 @@ def _first(
     begin: np.ndarray | None = None,
     turns: int = TURNS,
 ) -> np.ndarray:
-    """Log depth of one frame by itself, about 0: shape and hue's share of the albedo in turns."""
+    """Log depth of one frame by itself, about 0: shape, and hue's share of the albedo and the lamp's, in turns."""
     log_z, use = np.zeros_like(light) if begin is None else begin, known > 0.5
     if use.sum() < 16:
         return log_z
-    features = hue - np.median(hue[use], axis=0)
+    falls = (lattice.ray.reshape(*light.shape, 2) ** 2).sum(-1, keepdims=True)
+    features = np.concatenate([hue, falls / falls.max()], -1)
+    features -= np.median(features[use], axis=0)
+    prior = np.diag((ALBEDO / np.array([HUE, HUE, FALL])) ** 2) / SAMPLES
     for _ in range(turns):
         rho = light + shading(lattice, log_z)
-        tilt = features[use].T @ features[use] / use.sum() + (ALBEDO / HUE) ** 2 / 50 * np.eye(2)
+        tilt = features[use].T @ features[use] / use.sum() + prior
         weights = np.linalg.solve(tilt, features[use].T @ (rho[use] - np.median(rho[use])) / use.sum())
         painted = features @ weights
         level = np.median((rho - painted)[use])
