@@ -16,7 +16,8 @@ EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 
 def skin(body: Body, some: np.ndarray | None = None) -> np.ndarray:
     """Triangles between particles around the body, or around `some` of them, (P,) bool, and along both sides of its
-    tears, (F, 3) int: every edge has an even number of them, and (b - a) x (c - a) points out."""
+    tears, (F, 3) int: every edge has an even number of them, and (b - a) x (c - a) points out. What is one particle
+    thick encloses nothing and is left out, all or in part."""
     chosen = np.arange(len(body.rest)) if some is None else np.flatnonzero(some)
     return chosen[around(body.rest[chosen].astype(float), ALPHA * width(body), Tear(body.torn.astype(float)))]
 
