@@ -19,7 +19,7 @@ def skin(body: Body, some: np.ndarray | None = None) -> np.ndarray:
     tears, (F, 3) int: every edge has an even number of them, and (b - a) x (c - a) points out. What is one particle
     thick encloses nothing and is left out, all or in part."""
     chosen = np.arange(len(body.rest)) if some is None else np.flatnonzero(some)
-    return chosen[around(body.rest[chosen].astype(float), ALPHA * width(body), Tear(body.torn.astype(float)))]
+    return chosen[alpha_shape(body.rest[chosen].astype(float), ALPHA * width(body), Tear(body.torn.astype(float)))]
 
 
 def width(body: Body) -> float:
@@ -27,7 +27,7 @@ def width(body: Body) -> float:
     return float(np.cbrt(np.median(body.volume.astype(float))))
 
 
-def around(place: np.ndarray, alpha: float, tear: Tear | None = None) -> np.ndarray:
+def alpha_shape(place: np.ndarray, alpha: float, tear: Tear | None = None) -> np.ndarray:
     """Triangles around points [m], (P, 3), as an alpha shape has them, (F, 3) int; alpha: largest radius [m].
 
     Edelsbrunner and Mücke, Three-dimensional alpha shapes, ACM Trans. Graph. 13 (1994). Empty where the points enclose
@@ -49,10 +49,14 @@ def around(place: np.ndarray, alpha: float, tear: Tear | None = None) -> np.ndar
     return faces[first[count == 1]]
 
 
-def closed(faces: np.ndarray) -> bool:
+def watertight(faces: np.ndarray) -> bool:
     """Whether triangles (F, 3) leave no edge open."""
-    edges = np.sort(np.concatenate([faces[:, [1, 2]], faces[:, [0, 2]], faces[:, [0, 1]]]), axis=1)
-    return len(faces) > 0 and bool((np.unique(edges, axis=0, return_counts=True)[1] % 2 == 0).all())
+    return len(faces) > 0 and bool((np.unique(edges(faces), axis=0, return_counts=True)[1] % 2 == 0).all())
+
+
+def edges(faces: np.ndarray) -> np.ndarray:
+    """Ends of each triangle's sides, the smaller number first: all that face corner 0, then 1, then 2, (3 F, 2) int."""
+    return np.sort(np.concatenate([faces[:, [1, 2]], faces[:, [0, 2]], faces[:, [0, 1]]]), axis=1)
 
 
 def normals(place: np.ndarray, faces: np.ndarray) -> np.ndarray:

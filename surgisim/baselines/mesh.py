@@ -8,7 +8,7 @@ import numpy as np
 from surgisim.artifacts.body import Body
 from surgisim.baselines.springs import Network, joined
 from surgisim.problem import Problem
-from surgisim.skin import ALPHA, around, width
+from surgisim.skin import edges, skin, width
 
 
 def network(body: Body, modulus: float) -> Network:
@@ -17,8 +17,7 @@ def network(body: Body, modulus: float) -> Network:
 
     Raises Problem where the particles enclose nothing.
     """
-    place, wide = body.rest.astype(float), width(body)
-    faces = around(place, ALPHA * wide)
+    place, wide, faces = body.rest.astype(float), width(body), skin(body)
     if not len(faces):
         raise Problem(f"baseline mesh: {len(place)} particles enclose no volume. Thicken the surface.")
     vertices, faces = np.unique(faces, return_inverse=True)
@@ -31,11 +30,10 @@ def network(body: Body, modulus: float) -> Network:
 
 def springs(faces: np.ndarray) -> np.ndarray:
     """Edges of triangles (F, 3), and the corners that face each other across those that two share, (S, 2) int."""
-    edge = np.sort(np.concatenate([faces[:, [1, 2]], faces[:, [0, 2]], faces[:, [0, 1]]]), axis=1)
     corner = faces.T.ravel()
-    edges, which, count = np.unique(edge, axis=0, return_inverse=True, return_counts=True)
+    once, which, count = np.unique(edges(faces), axis=0, return_inverse=True, return_counts=True)
     order = np.argsort(which.ravel(), kind="stable")
     begins = np.cumsum(count) - count
     two = begins[count == 2]
     facing = np.stack([corner[order[two]], corner[order[two + 1]]], 1)
-    return np.unique(np.sort(np.concatenate([edges, facing]), axis=1), axis=0)
+    return np.unique(np.sort(np.concatenate([once, facing]), axis=1), axis=0)

@@ -40,7 +40,7 @@ WEIGHED_EVERY = 2
 that once more."""
 MIDWAY_EVERY = 8
 """Iterations from one to the next that looks at a frame of which nothing is seen."""
-MOST_OF_IT = 0.5, 99.5
+BOX_PERCENTILES = 0.5, 99.5
 """Percentiles of the centres between which the scene's box lies [%]."""
 REPORTS = 100
 """Rows of the history."""
@@ -59,7 +59,7 @@ class Fit:
         self.unseen = np.setdiff1d(np.arange(seen.frame[-1]), seen.frame) / camera.fps
         self.field = first_field(start.mean, camera, length, settings, self.rng).on(self.device)
         self.radius = float(np.exp(np.median(start.scale)))
-        side = np.ptp(np.percentile(start.mean, MOST_OF_IT, axis=0), axis=0).max()
+        side = np.ptp(np.percentile(start.mean, BOX_PERCENTILES, axis=0), axis=0).max()
         self.unit = max(settings.anisotropy_unit * side, SMALLEST_UNIT * self.radius)
         self.most = min(settings.most_gaussians, int(settings.growth * len(start.mean)))
         self.middle = float(np.median(start.mean[:, 2]))
@@ -297,7 +297,7 @@ def first_field(
     mean: np.ndarray, camera: Camera, length: int, settings: Reconstruction, rng: np.random.Generator
 ) -> Field:
     """A still field over the scene's box and the clip's time; outliers lie outside the box and read its border."""
-    low, high = np.percentile(mean, MOST_OF_IT, axis=0).astype(float)
+    low, high = np.percentile(mean, BOX_PERCENTILES, axis=0).astype(float)
     room = 0.02 * (high - low) + 1e-3 * np.max(high - low)
     low, high = low - room, high + room
     share = (high - low) / np.max(high - low)

@@ -5,7 +5,7 @@
 Mean of |z - z_given| / z_given over tissue in all frames, after one factor for the clip; and, as something to beat,
 that of the plane which fits each frame's given depth best, and so knows what the backends do not. Beside that how far
 the change of depth since frame 0 is off, of tissue that is seen to move: root mean square over that of the given one.
-A depth that is only shown, as colours in a panel of a film, is read with --film, --panel and --shown.
+A depth that is only shown, as colours in a panel of a film, is read with --film, --panel and --range.
 """
 
 import argparse
@@ -74,23 +74,33 @@ def change_off(found: np.ndarray, given: np.ndarray, counted: np.ndarray, surfac
     there = sure & known & known[:, :1]
     there &= moving(from_start(xy), there, there.any(1))
     wanted, ours = (from_start(sampled(z, xy))[there] for z in (given, found * scale_between(found, given, counted)))
-    return (
-        round(100 * float(np.linalg.norm(ours - wanted) / np.linalg.norm(wanted)), 1) if len(wanted) else float("nan")
-    )
+    if not wanted.any():
+        return float("nan")
+    return round(100 * float(np.linalg.norm(ours - wanted) / np.linalg.norm(wanted)), 1)
 
 
 def panel_depth(film: Path, panel: list[int], shown: list[float], shape: tuple[int, int, int]) -> np.ndarray:
     """Depth [m] that a film's panel (x, y, width, height) [px] shows as OpenCV's JET from the nearest to the farthest
-    shown [m], (T, H, W); 0 where its colour is none of the map's, as under a title, and around there."""
+    shown [m], (T, H, W); 0 where its colour is none of the map's, as under a title, and around there.
+
+    Raises Problem for a film of another length."""
     x, y, width, height = panel
     colours = cv2.applyColorMap(np.arange(256, dtype=np.uint8)[:, None], cv2.COLORMAP_JET)[:, 0, ::-1]
     tree, found = cKDTree(colours.astype(float)), np.zeros(shape)
-    for t, rgb in zip(range(shape[0]), opened(film, max_pixels=MOST_PIXELS).frames(), strict=False):
+    count = 0
+    for t, rgb in enumerate(opened(film, max_pixels=MOST_PIXELS).frames()):
+        count = t + 1
+        if count > len(found):
+            continue
         away, k = tree.query(rgb[y : y + height, x : x + width].reshape(-1, 3).astype(float))
         z = (shown[0] + (shown[1] - shown[0]) * k / 255).reshape(height, width)
         known = cv2.erode((away < FOREIGN).reshape(height, width).astype(np.uint8), np.ones((5, 5), np.uint8))
         z, known = (cv2.resize(a, shape[:0:-1], interpolation=cv2.INTER_NEAREST) for a in (z, known))
         found[t] = np.where(known, z, 0.0)
+    if count != len(found):
+        raise Problem(
+            f"{film}: has {count} frames, and the clip {len(found)}: they are compared one by one. Ingest every frame."
+        )
     return found
 
 
@@ -123,12 +133,12 @@ def main() -> None:
     cli.add_argument("--backends", nargs="+", default=["near_light"], help="of depth")
     cli.add_argument("--film", type=Path, help="a film that shows depth as colours")
     cli.add_argument("--panel", type=int, nargs=4, metavar=("X", "Y", "WIDTH", "HEIGHT"), help="where [px]")
-    cli.add_argument("--shown", type=float, nargs=2, metavar=("NEAR", "FAR"), help="what the colours span [m]")
+    cli.add_argument("--range", type=float, nargs=2, metavar=("NEAR", "FAR"), help="what the colours span [m]")
     args = cli.parse_args()
-    asked = [args.film, args.panel, args.shown]
+    asked = [args.film, args.panel, args.range]
     if any(asked) != all(asked):
-        cli.error("--film, --panel and --shown are one: pass all three or none.")
-    panel = {"film": args.film, "panel": args.panel, "shown": args.shown} if args.film else None
+        cli.error("--film, --panel and --range are one: pass all three or none.")
+    panel = {"film": args.film, "panel": args.panel, "shown": args.range} if args.film else None
     json.dump({"unit": "%", **compared(args.results, args.backends, panel)}, sys.stdout, indent=1)
     print()
 

@@ -10,7 +10,7 @@ from surgisim.baselines import mesh, point_cloud
 from surgisim.baselines.springs import SAFETY, Network, masses, spread, stable_step, swing
 from surgisim.mpm.grip import Drive
 from surgisim.problem import Problem
-from surgisim.skin import closed, skin, width
+from surgisim.skin import skin, watertight, width
 
 E = 1000.0
 
@@ -44,7 +44,7 @@ def test_a_cloud_stretches_as_its_modulus_says(axis):
 def test_a_mesh_is_closed_and_its_skin_stretches_as_its_modulus_says():
     body = block(size=(0.06, 0.06, 0.02))
     wide, faces = width(body), skin(body)
-    assert closed(faces)
+    assert watertight(faces)
     corners = body.rest[faces].astype(float)
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
     sides = np.array([0.06, 0.06, 0.02]) - wide

@@ -85,3 +85,5 @@ def test_a_depth_that_a_panel_shows_is_read_back(tmp_path):
     known = found > 0
     assert known.mean() > 0.85
     assert np.abs(found - z)[known].mean() < 0.002
+    with pytest.raises(Problem, match="has 3 frames, and the clip 4"):
+        panel_depth(tmp_path / "film.mp4", [0, 48, 64, 48], [0.05, 0.13], (4, 48, 64))

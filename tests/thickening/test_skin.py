@@ -7,7 +7,7 @@ import pytest
 from slab import slab
 
 from surgisim.artifacts.ply import read_ply
-from surgisim.skin import around, closed, normals, skin, volume, width
+from surgisim.skin import alpha_shape, normals, skin, volume, watertight, width
 from surgisim.thickening import mesh
 
 SIZE = np.array([0.048, 0.036, 0.018])
@@ -16,7 +16,7 @@ SIZE = np.array([0.048, 0.036, 0.018])
 def test_a_block_is_enclosed_up_to_the_outermost_centres():
     body = slab(tuple(SIZE))
     faces, place = skin(body), body.rest.astype(float)
-    assert closed(faces)
+    assert watertight(faces)
     assert volume(place, faces) == pytest.approx(np.prod(SIZE - width(body)), rel=2e-3)
 
 
@@ -35,7 +35,7 @@ def test_a_notch_is_left_out():
     place = body.rest.astype(float)
     notch = (np.abs(place[:, 0]) < 0.25 * SIZE[0]) & (place[:, 2] < place[:, 2].min() + 0.45 * SIZE[2])
     faces = skin(body, ~notch)
-    assert closed(faces)
+    assert watertight(faces)
     assert not notch[faces].any()
     # Half as wide and half as deep, and a particle more on each side of it.
     wide = width(body)
@@ -47,7 +47,7 @@ def test_along_a_tear_it_has_two_sides():
     whole = slab(tuple(SIZE))
     torn = replace(whole, torn=np.array([[[0.0, -1.0], [0.0, 0.0]]]))
     faces, place = skin(torn), whole.rest.astype(float)
-    assert closed(faces)
+    assert watertight(faces)
     x, y = place[:, 0], place[:, 1]
     between = (np.sign(x[faces]).min(1) < np.sign(x[faces]).max(1)) & (y[faces].max(1) < 0)
     assert not between.any()
@@ -59,8 +59,8 @@ def test_along_a_tear_it_has_two_sides():
 
 def test_what_encloses_nothing_has_none():
     for points in np.zeros((3, 3)), np.random.default_rng(0).random((40, 3)):
-        assert around(points, 1e-3).shape == (0, 3)
-    assert not closed(np.empty((0, 3), int))
+        assert alpha_shape(points, 1e-3).shape == (0, 3)
+    assert not watertight(np.empty((0, 3), int))
 
 
 def test_the_mesh_file_holds_it(tmp_path):
@@ -75,5 +75,5 @@ def test_the_mesh_file_holds_it(tmp_path):
     rows = np.frombuffer(raw[-13 * len(faces) :], [("count", "u1"), ("corners", "<i4", 3)])
     assert (rows["count"] == 3).all()
     place = np.stack([columns[k] for k in "xyz"], 1).astype(float)
-    assert closed(rows["corners"])
+    assert watertight(rows["corners"])
     assert volume(place, rows["corners"]) == pytest.approx(np.prod(SIZE), rel=0.03)

@@ -31,7 +31,7 @@ from surgisim.side_by_side import in_order
 
 TRUST = 0.5
 """Confidence of a well explained pixel: brightness tells changes well and shapes only roughly."""
-ALBEDO, HUE, FALL = 0.25, 0.15, 1.0
+ALBEDO, HUE, FALL_OFF = 0.25, 0.15, 1.0
 """Spread of log albedo that hue does not explain; of the hue's coefficients; of how far the lamp's log brightness falls
 off from the view's middle to its corner."""
 SAMPLES = 50
@@ -188,7 +188,7 @@ def _first(
     falls = (lattice.ray.reshape(*light.shape, 2) ** 2).sum(-1, keepdims=True)
     features = np.concatenate([hue, falls / falls.max()], -1)
     features -= np.median(features[use], axis=0)
-    prior = np.diag((ALBEDO / np.array([HUE, HUE, FALL])) ** 2) / SAMPLES
+    prior = np.diag((ALBEDO / np.array([HUE, HUE, FALL_OFF])) ** 2) / SAMPLES
     for _ in range(turns):
         rho = light + shading(lattice, log_z)
         tilt = features[use].T @ features[use] / use.sum() + prior
