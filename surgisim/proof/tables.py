@@ -131,8 +131,8 @@ def _environments(scenes: dict[tuple, Metrics]) -> Table:
             for clip, v, seed in scenes
             if v == variant != MAIN and (clip, MAIN, seed) in scenes
         ]
-        gained = [_of(a, "reconstruction", names[0]) - _of(b, "reconstruction", names[0]) for a, b in pairs]
-        apart[variant] = _interval(gained)
+        gained = [(a.clip, _of(a, "reconstruction", names[0]) - _of(b, "reconstruction", names[0])) for a, b in pairs]
+        apart[variant] = _interval(_by_clip(gained))
         rows.append(_row(words, [*cells, apart[variant], *_means(mine, "scene", geometry)]))
     clips, seeds = (len({key[k] for key in scenes if key[1] in ENVIRONMENT}) for k in (0, 2))
     return {
@@ -140,7 +140,7 @@ def _environments(scenes: dict[tuple, Metrics]) -> Table:
         "title": "Simulation environment: first 25 frames, terms left out",
         "protocol": f"Mean over {clips} clip{'s' * (clips > 1)} and {seeds} seeds of the fit, of all first 25 frames, "
         "used or not; tissue pixels. Beside ours: PSNR against ours of the same clip and seed. Intervals (90 %) are "
-        "Student's over clips and seeds.",
+        "Student's over clips, each the mean of its seeds; over the seeds where there is one clip.",
         "columns": [
             *(words for _, words in KINDS),
             "PSNR beside ours [dB]",
@@ -263,7 +263,17 @@ def _of(run: Metrics, group: str, name: str) -> float:
 
 
 def _means(runs: list[Metrics], group: str, names: Iterable[str]) -> list[Cell]:
-    return [_interval([_of(run, group, name) for run in runs]) for name in names]
+    return [_interval(_by_clip([(run.clip, _of(run, group, name)) for run in runs])) for name in names]
+
+
+def _by_clip(values: Sequence[tuple[str, float]]) -> list[float]:
+    """Each clip's mean, of clips and values, missing ones left out; the values themselves where there is one clip.
+    Seeds of a clip say nothing of what other clips would."""
+    known = [(clip, value) for clip, value in values if math.isfinite(value)]
+    clips = list(dict.fromkeys(clip for clip, _ in known))
+    if len(clips) < 2:
+        return [value for _, value in known]
+    return [float(np.mean([value for c, value in known if c == clip])) for clip in clips]
 
 
 def _interval(values: Iterable[float]) -> Cell:

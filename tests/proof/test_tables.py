@@ -38,7 +38,8 @@ def found():
         for seed in range(3):
             psnr = 36 + rng.normal()
             scenes += [scene(clip, "main", seed, psnr), scene(clip, "no_both", seed, psnr - 0.5 + 0.01 * seed)]
-            scenes += [scene(clip, "no_trajectory", seed, psnr + 0.1 * (seed - 1))]
+            beside = 0.1 if clip == "a" else -0.1
+            scenes += [scene(clip, "no_trajectory", seed, psnr + beside + 0.001 * seed)]
     return tables(runs, [*scenes, scene("a", "near_light", 0, 30.0)], {"seeds": [0, 1, 2]})
 
 
@@ -66,6 +67,9 @@ def test_terms_are_judged_against_ours_of_the_same_clip_and_seed(found):
     # Scenes differ by 1 dB from seed to seed, pairs by hundredths.
     assert rows["without both"]["value"] == pytest.approx(-0.49)
     assert rows["without both"]["high"] < -0.45
+    # Two clips that differ by .2 dB tell no more for three seeds each that agree.
+    apart = rows["without trajectory term"]
+    assert (apart["value"], apart["high"]) == pytest.approx((0.001, 0.001 + 6.3138 * 0.1), abs=1e-4)
     words = environment["words"]
     assert "without both (-0.36 dB printed): worse, as printed" in words
     assert "without trajectory term (-0.08 dB printed): no difference that can be told" in words
