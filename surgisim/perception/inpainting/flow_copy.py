@@ -7,7 +7,7 @@ so that it does not flicker; near the rim it is what grows from each frame's own
 """
 
 from collections.abc import Callable
-from itertools import count, pairwise
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -161,25 +161,24 @@ def _looked_up(rgb: np.ndarray, source: Source, chosen: np.ndarray) -> np.ndarra
 
 def _invent_into(filled, known, to_next, to_last, invent: Invent, progress) -> None:
     """Fill what is left, beginning in the frame that lacks most and carrying that to both ends."""
-    total = len(filled)
-    lacking = (~known).sum((1, 2))
-    if not lacking.any():
+    total, gap = len(filled), ~known
+    if not gap.any():
         return
-    first, done = int(np.argmax(lacking)), count(1)
-    filled[first] = np.where(known[first][..., None], filled[first], invent(filled[first], ~known[first]))
+    lacking = [t for t in range(total) if gap[t].any()]
+    invented = in_order(invent, ((filled[t], gap[t]) for t in lacking))
+    for done, (t, alone) in enumerate(zip(lacking, invented, strict=True)):
+        progress(total * (0.8 + 0.2 * done / len(lacking)), total, "inventing what no frame saw")
+        filled[t] = alone
+    first = int(np.argmax(gap.sum((1, 2))))
 
     def onward(order: range, flow: list[np.ndarray]) -> None:
-        before = seen(first, np.zeros_like(known[first]))
+        before = seen(first, np.zeros_like(gap[first]))
         for t in order:
-            progress(total * (0.8 + 0.2 * next(done) / (total + 1)), total, "inventing what no frame saw")
-            gap = ~known[t]
-            here = followed(before, flow[t], t, gap)
-            taken, left = gap & here.found, gap & ~here.found
-            if gap.any():
-                filled[t] = invent(filled[t], gap)
-                share = _near_rim(gap)[taken][:, None]
-                carried = share * filled[t][taken] + (1 - share) * _looked_up(filled, here, taken)
-                filled[t][taken] = np.rint(carried).astype(np.uint8)
+            here = followed(before, flow[t], t, gap[t])
+            taken, left = gap[t] & here.found, gap[t] & ~here.found
+            share = _near_rim(gap[t])[taken][:, None]
+            carried = share * filled[t][taken] + (1 - share) * _looked_up(filled, here, taken)
+            filled[t][taken] = np.rint(carried).astype(np.uint8)
             before = Source(np.where(left, t, here.frame), here.xy)
 
     for _ in in_order(onward, ((range(first + 1, total), to_last), (range(first - 1, -1, -1), to_next))):
