@@ -58,7 +58,7 @@ def test_a_layer_moves_the_same_whichever_way_it_lies(layer):
 @pytest.mark.parametrize("pull", [(0.09, -0.03, 0.06), (-0.06, 0.02, 0.10), (0.0, 0.08, 0.01)])
 def test_a_planted_pull_is_found_along_the_view(lattice, layer, pull):
     rest, watched, change = _pulled(lattice, layer, np.array(pull))
-    found, _ = nearer(lattice, rest, watched)
+    found = nearer(lattice, rest, watched)[0]
     assert np.sqrt(((found - change) ** 2).sum() / (change**2).sum()) < 0.15
 
 
@@ -98,6 +98,15 @@ def test_a_view_that_slides_as_a_whole_brings_nothing_nearer(lattice, layer):
     rest, watched, _ = _pulled(lattice, layer, np.zeros(3))
     slid = watched.ray + 0.1 * COURSE[:, None, None]
     assert np.abs(nearer(lattice, rest, Watched(slid, watched.sure, watched.light, watched.lit))[0]).max() < 0.02
+
+
+def test_a_pulled_layer_explains_its_motion_and_stripes_that_go_to_and_fro_are_none(lattice, layer):
+    rest, watched, _ = _pulled(lattice, layer, np.array([0.09, -0.03, 0.06]))
+    assert nearer(lattice, rest, watched)[2][COURSE > 0].min() > 0.8
+    # Stripes that go to and fro, as no held ball carries its surroundings.
+    fold = 0.05 * np.sin(25 * watched.ray[0, :, :1]) * [0.0, 1.0]
+    folded = Watched(watched.ray[0] + COURSE[:, None, None] * fold, watched.sure, watched.light, watched.lit)
+    assert nearer(lattice, rest, folded)[2][COURSE > 0.5].max() < 0.3
 
 
 def test_what_goes_farthest_is_the_whole_course_though_more_frames_go_a_little_the_other_way():

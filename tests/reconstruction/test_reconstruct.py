@@ -30,15 +30,19 @@ def test_frames_never_shown_are_predicted(clip, done):
 
 
 @pytest.mark.skipif(bool(lacking()), reason=f"gsplat needs {lacking()}")
-def test_on_a_gpu_the_scene_is_as_good(clip, done):
-    there = reconstruct(*parts(clip, settings=clip.settings.model_copy(update={"device": "cuda"})))
+def test_on_a_gpu_the_scene_is_as_good(clip):
     held = clip.frames.split == 1
 
-    def psnr(result):
-        wrong = (result.rendered.rgb[held] / 255 - clip.inpainted.rgb[held] / 255)[clip.masks.tissue[held]]
+    def psnr(device, seed):
+        settings = clip.settings.model_copy(update={"device": device, "seed": seed})
+        shown = reconstruct(*parts(clip, settings=settings)).rendered.rgb[held]
+        wrong = (shown / 255 - clip.inpainted.rgb[held] / 255)[clip.masks.tissue[held]]
         return -10 * np.log10(np.mean(wrong**2))
 
-    assert psnr(there) > psnr(done) - 0.5
+    # Of so small a clip seeds alone give 38.6 to 40.3 dB on either.
+    here, there = (np.array([psnr(device, seed) for seed in range(4)]) for device in ("cpu", "cuda"))
+    doubt = np.hypot(here.std(ddof=1), there.std(ddof=1)) / 2
+    assert there.mean() > here.mean() - 2 * doubt
 
 
 @pytest.mark.skipif(not lacking(), reason="this machine can run gsplat")

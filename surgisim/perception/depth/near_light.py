@@ -10,6 +10,7 @@ In frame 0 albedo and shape share the blame: what goes with the hue is albedo, w
 from the view's middle may be the lamp, what is smooth is mostly shape.
 Afterwards the albedo travels with the tissue: a change of brightness along its way is a change of distance and slant,
 and with the motion seen across the view, the instrument's too, it tells how far pulled tissue comes nearer (pull.py).
+What is lost, or goes otherwise than pulled tissue, comes as much nearer as it grows brighter (brightening.py).
 The absolute size is not known: the median depth of frame 0 is set to a nominal one.
 """
 
@@ -23,6 +24,7 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.correspondence import Correspondence
 from surgisim.lighting.headlight import linear_light
 from surgisim.lighting.veil import ABOVE, veil_of
+from surgisim.perception.depth.brightening import brightened
 from surgisim.perception.depth.pull import Watched, nearer
 from surgisim.perception.depth.shading import Lattice, explain, shading
 from surgisim.perception.grasp.outline import Outline
@@ -51,9 +53,13 @@ class _Look:
     start: np.ndarray
     """Log depth the tissue had in frame 0, (h, w)."""
     light: np.ndarray
-    """Log brightness over the tissue's albedo, (h, w)."""
-    weight: np.ndarray
-    """How far the tissue is known, 0-1, (h, w)."""
+    """Log brightness over the albedo of frame 0's tissue there, (h, w)."""
+    known: np.ndarray
+    """How far its light is seen and is that of tissue which frame 0 shows, 0-1, (h, w)."""
+    sure: np.ndarray
+    """How surely it is that tissue, 0-1, (h, w)."""
+    moved: np.ndarray
+    """How far it has gone [lattice px], (h, w)."""
     origin: np.ndarray
     """Where in frame 0 it was [lattice px], (h, w, 2)."""
 
@@ -96,15 +102,17 @@ def estimate(
         if progress:
             progress(t + 1, 2 * len(rgb), "light along the tissue's way")
     z, confidence, origin = [], [], lattice.pixels
-    changes, places = nearer(lattice, rest, Watched(*map(np.stack, zip(*watched, strict=True))), tools)
-    for t, (frame, change, place) in enumerate(zip(frames, changes, places, strict=True)):
+    pulled = nearer(lattice, rest, Watched(*map(np.stack, zip(*watched, strict=True))), tools)
+    for t, (frame, change, place, explained) in enumerate(zip(frames, *pulled, strict=True)):
         position = (place.reshape(lattice.ray.shape) - lattice.ray[0, 0]) / (lattice.ray[1, 1] - lattice.ray[0, 0])
-        look = _look(lattice, position, *frame, rest, albedo, origin, ratio * camera.fx)
+        look = _look(lattice, position, *frame, rest, albedo, origin)
         origin = look.origin
         log_z = look.start + _at(change, look.origin)
-        misfit = np.where(look.weight > 0, look.light + shading(lattice, log_z), 0.0)
+        beyond = look.light + shading(lattice, log_z)
+        log_z = log_z + brightened(beyond, look.known, look.sure, look.moved, 1 - explained)
+        misfit = np.where(look.known > 0, look.light + shading(lattice, log_z), 0.0)
         z.append(_grow(np.exp(log_z), rgb.shape[1:3]))
-        trust = TRUST * np.exp(-((misfit / 0.3) ** 2)) * (0.2 + 0.8 * look.weight)
+        trust = TRUST * np.exp(-((misfit / 0.3) ** 2)) * (0.2 + 0.8 * look.sure * look.known)
         confidence.append(np.clip(_grow(trust, rgb.shape[1:3]), 0.0, 1.0))
         if progress:
             progress(len(rgb) + t + 1, 2 * len(rgb), "depth from light")
@@ -141,20 +149,22 @@ def _watch(lattice: Lattice, position: np.ndarray, sure: np.ndarray, now) -> tup
     return parts[0], *(part.ravel() for part in parts[1:])
 
 
-def _look(lattice, position, sure, now, alone, rest, albedo, origin, focal) -> _Look:
+def _look(lattice, position, sure, now, alone, rest, albedo, origin) -> _Look:
     light, _, known = now
     origin, found = _inverse(position, origin, lattice)
-    weight = found * _at(sure, origin)
+    sure = found * _at(sure, origin)
     # Tissue that frame 0 did not show has the shape that this frame alone suggests, fitted to what is known around it.
     surely = found.max() > 0.1
     start = alone + (spread(_at(rest, origin) - alone, found) if surely else np.median(rest) - np.median(alone))
-    moved = spread(np.linalg.norm(origin - lattice.pixels, axis=-1), weight) / focal
+    moved = spread(np.linalg.norm(origin - lattice.pixels, axis=-1), sure)
     moved = cv2.GaussianBlur(moved.astype(np.float32), (0, 0), 1.5).astype(float)
-    weight = weight * known
     excess = light - _at(albedo, origin)
-    still = (weight > 0.5) & (moved < 0.5 / focal)
-    gain = np.median((excess + shading(lattice, start))[still]) if still.mean() > 0.05 else 0.0
-    return _Look(start, np.where(weight > 0, excess - gain, 0.0), weight, origin)
+    followed = sure * known > 0.5
+    still = followed & (moved < 0.5)
+    # Exposure is what still tissue, or where none is all that is followed, shares.
+    tells = still if still.mean() > 0.05 else followed
+    gain = np.median((excess + shading(lattice, start))[tells]) if tells.mean() > 0.05 else 0.0
+    return _Look(start, excess - gain, found * known, sure, moved, origin)
 
 
 def _read(rgb: np.ndarray, covered: np.ndarray, shape: tuple[int, int], grey: float):

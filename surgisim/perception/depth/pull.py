@@ -117,8 +117,9 @@ class _Carried:
 
 def nearer(
     lattice: Lattice, rest: np.ndarray, watched: Watched, tools: Sequence[Outline] = ()
-) -> tuple[np.ndarray, np.ndarray]:
-    """Change of log depth of frame 0's tissue by a pull, (T, h, w), 0 where nothing is seen to move; and its place.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Change of log depth of frame 0's tissue by a pull, (T, h, w), 0 where nothing is seen to move; its place; and how
+    far the layer explains the motion seen, 0-1, (T,).
 
     The place is X and Y of (X, Y, 1), (T, K, 2): as seen where that is sure, else as the layer has it.
     rest: log depth in frame 0, (h, w). tools: the instruments, one of which may hold the tissue.
@@ -134,8 +135,9 @@ def nearer(
     size = np.linalg.norm(pattern, axis=-1) * sure
     largest = np.percentile(size, 99.5)
     change = np.zeros((len(course), *lattice.shape))
+    explained = np.ones(len(course))
     if largest < VISIBLE * pixel:
-        return change, watched.ray
+        return change, watched.ray, explained
     lit = watched.lit * watched.lit[0] * watched.sure
     still = (lit > 0.5) & (np.linalg.norm(across, axis=-1) < pixel / 2)
     brighter = _without_gain(watched.light - watched.light[0], still)
@@ -171,11 +173,11 @@ def nearer(
             weight_light=lit[t] * lively / np.hypot(LIGHT, restless[t]),
             jaws=jaws.each[t],
         )
-        moved, explained = _moved(now, best, share)
-        change[t] = np.log1p(np.maximum(explained * moved[:, 2] / z, -0.8)).reshape(lattice.shape)
+        moved, explained[t] = _moved(now, best, share)
+        change[t] = np.log1p(np.maximum(explained[t] * moved[:, 2] / z, -0.8)).reshape(lattice.shape)
         layer = (tissue + moved)[:, :2] / (tissue + moved)[:, 2:] + everywhere[t] / z[:, None]
-        place[t] += explained * (1 - watched.sure[t])[:, None] * (layer - place[t])
-    return change, place
+        place[t] += explained[t] * (1 - watched.sure[t])[:, None] * (layer - place[t])
+    return change, place, explained
 
 
 def _carried(
