@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 LIGHT, ALBEDO = 0.1, 0.25
-"""Spread of log brightness along the way of tissue that is followed; of tissue that is not, and may be of another albedo
+"""Spread of log brightness along the way of tissue that is followed; of tissue that is not, whose albedo may be another
 than what is taken for it."""
 FREE = 0.3
 """Expected spread of the change of log depth."""
