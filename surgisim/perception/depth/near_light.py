@@ -42,6 +42,8 @@ TURNS = 20
 """How often shape and albedo take turns: where tissue lies steep, six left a sixth of the slope unfound."""
 STRETCH, AFRESH = 16, 3
 """Frames whose shapes by themselves are begun from one another; turns of the first of them, begun from frame 0's."""
+BESIDE = 2
+"""How far beside what is hidden light may be the instrument's doing, its shadow and its blur [lattice px]."""
 FIRST_DETAIL = 0.6
 """Finest wave of shape that is believed, as a share of the longer image side."""
 
@@ -109,7 +111,8 @@ def estimate(
         origin = look.origin
         log_z = look.start + _at(change, look.origin)
         beyond = look.light + shading(lattice, log_z)
-        log_z = log_z + brightened(beyond, look.known, look.sure, look.moved, 1 - explained)
+        clear = 1 - cv2.dilate(_shrink(hidden[t], lattice.shape), np.ones((2 * BESIDE + 1, 2 * BESIDE + 1)))
+        log_z = log_z + brightened(beyond, look.known * clear, look.sure, look.moved, 1 - explained)
         misfit = np.where(look.known > 0, look.light + shading(lattice, log_z), 0.0)
         z.append(_grow(np.exp(log_z), rgb.shape[1:3]))
         trust = TRUST * np.exp(-((misfit / 0.3) ** 2)) * (0.2 + 0.8 * look.sure * look.known)
