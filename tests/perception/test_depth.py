@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 from pulled_sheet import camera, pull_sheet
 
+from surgisim.artifacts.correspondence import Correspondence
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.given import Given
 from surgisim.artifacts.inpainted import COPIED, SEEN, Inpainted
@@ -99,6 +100,30 @@ def test_tissue_that_comes_nearer_is_told_from_tissue_that_only_slides(pull):
     assert np.sqrt(((change - true) ** 2).mean()) < 0.0011
     back = (sample(z[-1], sheet.position[-1]) - z[0])[moved]
     assert np.abs(back).mean() < 0.0004
+
+
+def test_a_loop_that_tracking_loses_comes_nearer_as_it_grows_brighter():
+    count, nearer = 6, 0.7
+    cam = camera(128, 96, count)
+    y, x = np.indices((96, 128))
+    loop = np.hypot(x - 70, y - 45) < 18
+    light = np.exp(-shading.shading(shading.Lattice.of(cam, 1.0), np.zeros((96, 128))))
+    paint = 1 + 0.05 * np.random.default_rng(0).standard_normal(light.shape)
+    rgb, moved = np.empty((count, 96, 128, 3), np.uint8), np.zeros((count, 96, 128, 2), np.float16)
+    seen = np.ones((count, 96, 128), bool)
+    for t, share in enumerate(np.linspace(0, 1, count)):
+        linear = 0.25 * paint * light * np.where(loop, nearer ** (-2 * share), 1.0)
+        rgb[t] = np.rint(255 * to_srgb(np.clip(linear[..., None] * [1.0, 0.6, 0.5], 0, 1)))
+        # Stripes that go to and fro are no pulled layer.
+        moved[t, ..., 1] = 4 * share * np.sin(0.2 * x)
+        seen[t] = ~loop | (t == 0)
+    surface = Correspondence(moved, seen, np.zeros(seen.shape, np.float16), np.zeros(seen.shape, bool))
+    none = np.zeros(seen.shape, bool)
+    z, confidence = near_light.estimate(rgb, none, none, cam, surface)
+    change = np.log(z[-1] / z[0])
+    assert np.median(change[loop]) == pytest.approx(np.log(nearer), rel=0.35)
+    assert np.abs(np.median(change[~cv2.dilate(loop.astype(np.uint8), np.ones((9, 9))).astype(bool)])) < 0.03
+    assert confidence[-1][loop].mean() < 0.5 * confidence[-1][~loop].mean()
 
 
 def test_holes_and_frames_without_any_depth_are_bridged():

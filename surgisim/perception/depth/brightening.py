@@ -1,4 +1,4 @@
-"""How far tissue comes nearer that no pulled layer explains: twice its change of log distance is its change of light.
+"""How far tissue comes nearer that no pulled layer explains: by half of what its log brightness grows.
 
 A loop that is lifted and turned over is soon lost to tracking, and goes otherwise than the soft layer of pull.py; but
 its light grows with the square of its nearness, and that shows best. How it turns is left out: where a loop hides what
