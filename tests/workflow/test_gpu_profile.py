@@ -14,3 +14,9 @@ def test_what_needs_nothing_of_each_other_runs_side_by_side(long, beside):
     threads = yaml.safe_load(PROFILE.read_text())["set-threads"]
     # What the profile does not name has the rule's own two.
     assert threads[long] + threads.get(beside, 2) <= PROCESSORS
+
+
+def test_only_what_computes_on_a_gpu_waits_for_one():
+    profile = yaml.safe_load(PROFILE.read_text())
+    on_gpu = {line.split("=")[0] for line in profile["config"] if "device: cuda" in line} | {"scene_again"}
+    assert set(profile["set-resources"]) == on_gpu
