@@ -8,6 +8,7 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.deformation import Deformation
 from surgisim.artifacts.depth import Depth
 from surgisim.artifacts.frames import Frames
+from surgisim.artifacts.given import Given
 from surgisim.artifacts.inpainted import Inpainted
 from surgisim.artifacts.masks import Masks
 from surgisim.artifacts.metrics import Metrics
@@ -22,6 +23,7 @@ from surgisim.stage import Maybe, Source, stage
     reads={
         "frames": Frames,
         "camera": Camera,
+        "given": Given,
         "masks": Masks,
         "inpainted": Inpainted,
         "depth": Depth,

@@ -51,9 +51,9 @@ class Reconstruction(Settings):
     correspondence: float = Field(0.3, ge=0)
     """Weight of how far the field carries Gaussians past where the surface was seen to go, 0 switches it off; of
     errors counted in 1 % of the longest image side [1]."""
-    midway: float = Field(0.003, ge=0)
-    """Weight of how far Gaussians are from half way in frames that are not looked at, 0 switches it off; counted in
-    median first radii [1]."""
+    midway: float = Field(0.03, ge=0)
+    """Weight of how far Gaussians are from half way in frames that are not looked at, where what was seen goes straight
+    on there; 0 switches it off; counted in median first radii [1]."""
     anisotropy: float = Field(1.0, ge=0)
     """Weight of the anisotropic term, 0 switches it off [1]."""
     anisotropy_largest: float = Field(1.0, gt=0)
@@ -71,6 +71,8 @@ class Reconstruction(Settings):
     squared: float = Field(1.0, ge=0)
     """Weight of the squared colour misfit beside the absolute one, of colours 0-1: few pixels that are far off, such as
     highlights, are what PSNR counts [1]."""
+    structure: float = Field(0.2, ge=0)
+    """Weight of one minus the structural similarity, once colours may change: pictures stay sharp [1]."""
     depth: float = Field(0.5, ge=0)
     """Weight of the depth misfit [1/median depth]."""
     tint: float = Field(0.01, ge=0)

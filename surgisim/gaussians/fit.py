@@ -14,11 +14,12 @@ from surgisim.config.reconstruction import Reconstruction
 from surgisim.deformation.field import Field, still_field
 from surgisim.gaussians.adam import Adam
 from surgisim.gaussians.densify import ATTRIBUTES, Record, renew
-from surgisim.gaussians.losses import anisotropic, followed, masked_l1, trajectory
+from surgisim.gaussians.losses import anisotropic, followed, masked_l1, structure, trajectory
 from surgisim.gaussians.neighbours import groups
 from surgisim.gaussians.observations import Observations
 from surgisim.gaussians.rasterise import Image, engine_on, rasterise
 from surgisim.gaussians.schedule import Phase, phase_at, rate_at
+from surgisim.gaussians.straight import off_midway, straightness
 from surgisim.gaussians.tint import clock, knots, tint
 from surgisim.problem import Problem
 
@@ -56,7 +57,8 @@ class Fit:
         self.seen, self.camera, self.settings = seen.on(self.device), camera, settings
         self.rng = np.random.default_rng(settings.seed)
         self.moments = seen.frame / camera.fps
-        self.unseen = np.setdiff1d(np.arange(seen.frame[-1]), seen.frame) / camera.fps
+        self.unseen = np.setdiff1d(np.arange(seen.frame[-1]), seen.frame)
+        self.straight = straightness(seen.frame, self.unseen, self.seen.went, self.seen.sure)
         self.field = first_field(start.mean, camera, length, settings, self.rng).on(self.device)
         self.radius = float(np.exp(np.median(start.scale)))
         side = np.ptp(np.percentile(start.mean, BOX_PERCENTILES, axis=0), axis=0).max()
@@ -139,7 +141,9 @@ class Fit:
         times = [self.seen.frame[u] / self.camera.fps for u in frames]
         field = self.current_field()
         mean, color = adam.tensors["mean"], adam.tensors["color"]
-        moved, opacity, turn, grow = field.at(mean, times)
+        # A frozen field carries on what moves by little; what it would say of its own slope is left out.
+        with torch.set_grad_enabled(phase.moves_field):
+            moved, opacity, turn, grow = field.at(mean, times)
         added = self.added([clock(time, self.moments) for time in times]) if shown else torch.zeros_like(moved)
         radius = (adam.tensors["scale"] + grow).exp()
         recorded = iteration < RENEWALS[-1] * self.settings.iterations
@@ -188,6 +192,8 @@ class Fit:
         weight = seen.weight if phase.recolours else seen.texture
         wrong = (image.rgb - seen.rgb) * weight[..., None]
         color = masked_l1(image.rgb, seen.rgb, weight)
+        if not phase.moves_field and settings.structure:
+            color = color + settings.structure * structure(image.rgb, seen.rgb, weight)
         if settings.squared:
             color = color + settings.squared * (wrong * (image.rgb - seen.rgb)).sum() / (3 * weight.sum()).clamp(min=1)
         if phase.number == 1 and settings.pooled:
@@ -232,15 +238,15 @@ class Fit:
         return total
 
     def off_midway(self, field: Field, turn: int) -> torch.Tensor:
-        """How far Gaussians are, in a frame that is not looked at, from half way between those beside it [median first
-        radius]; such frames take turns."""
-        time = self.unseen[turn % len(self.unseen)]
-        k = int(np.searchsorted(self.moments, time))
-        before, after = self.moments[k - 1], self.moments[k]
-        mean, share = self.adam.tensors["mean"].detach(), (time - before) / (after - before)
-        with torch.no_grad():
-            first, last = field.at(mean, [before, after])[0]
-        return (field(mean, time)[0] - torch.lerp(first, last, share)).norm(dim=1).mean() / self.radius
+        """How far Gaussians are, in a frame that is not looked at, from half way between those beside it; such frames
+        take turns."""
+        k = turn % len(self.unseen)
+        time = self.unseen[k] / self.camera.fps
+        after = int(np.searchsorted(self.moments, time))
+        mean = self.adam.tensors["mean"].detach()
+        row, column, _ = self.rest_pixels(mean)
+        moments = self.moments[after - 1], time, self.moments[after]
+        return off_midway(field, mean, moments, self.straight[k, row, column].float(), self.radius)
 
     @torch.no_grad()
     def bound(self) -> None:
@@ -256,14 +262,18 @@ class Fit:
     def astray(self, moved: torch.Tensor, seen: Observations) -> torch.Tensor:
         """How far the field carries Gaussians past where the surface was seen to go; the scene at rest stays."""
         rest = self.adam.tensors["mean"].detach()
-        start = pixels(rest, self.camera)
-        height, width = seen.sure.shape[1:]
-        column, row = start.round().long().unbind(1)
-        inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
-        row, column = row.clamp(0, height - 1), column.clamp(0, width - 1)
+        row, column, inside = self.rest_pixels(rest)
         went, sure = seen.went[:, row, column].float(), seen.sure[:, row, column].float() * inside
+        start = pixels(rest, self.camera)
         gone = pixels(rest + moved, self.camera) - start
-        return followed(gone.flatten(0, 1), went.flatten(0, 1), sure.flatten(), unit=0.01 * max(height, width))
+        return followed(gone.flatten(0, 1), went.flatten(0, 1), sure.flatten(), unit=0.01 * max(seen.sure.shape[1:]))
+
+    def rest_pixels(self, rest: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Row and column of frame 0's pixel nearest to each Gaussian, (G,) each, and whether it lies in the frame."""
+        height, width = self.seen.sure.shape[1:]
+        column, row = pixels(rest, self.camera).round().long().unbind(1)
+        inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
+        return row.clamp(0, height - 1), column.clamp(0, width - 1), inside
 
     def renew(self) -> None:
         """Drop and split Gaussians."""

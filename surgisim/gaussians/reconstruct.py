@@ -5,7 +5,7 @@ Wang, Yang, Zhao, Yang and Shen, Realistic surgical simulation from monocular vi
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numba
 import numpy as np
@@ -20,14 +20,13 @@ from surgisim.artifacts.inpainted import Inpainted
 from surgisim.artifacts.masks import Masks
 from surgisim.artifacts.scene import Scene
 from surgisim.config.reconstruction import Reconstruction
-from surgisim.deformation.field import Field, deform, save_field
-from surgisim.gaussians.attributes import drawn
+from surgisim.deformation.field import save_field
 from surgisim.gaussians.engine_gsplat import lacking
 from surgisim.gaussians.fit import Fit, Say
 from surgisim.gaussians.initialise import initialise
 from surgisim.gaussians.observations import observe
-from surgisim.gaussians.rasterise import render, to_bytes
-from surgisim.gaussians.tint import clock, tinted
+from surgisim.gaussians.play import Play
+from surgisim.gaussians.rasterise import to_bytes
 from surgisim.problem import Problem
 
 
@@ -76,14 +75,8 @@ def reconstruct(
         fit = Fit(start, seen, camera, len(frames.rgb), settings)
         history = fit.run(progress)
         scene, field, tint = fit.result()
-        there = field.on(torch.device(settings.device))
-        gone = [clock(t / camera.fps, fit.moments) for t in range(len(frames.rgb))]
-        rgb = np.stack(
-            [
-                picture(scene, there, camera, t, tinted(scene.color, tint, gone[t]), settings.device)
-                for t in range(len(gone))
-            ]
-        )
+        play = Play(scene, field, fit.moments, tint, camera, settings.device)
+        rgb = np.stack([to_bytes(play.rgb(t / camera.fps).cpu().numpy()) for t in range(len(frames.rgb))])
     return Reconstructed(scene, save_field(field, fit.moments, tint, history), Frames(rgb, frames.split))
 
 
@@ -98,11 +91,3 @@ def threads(count: int) -> Iterator[None]:
     finally:
         torch.set_num_threads(before[0])
         numba.set_num_threads(before[1])
-
-
-def picture(
-    scene: Scene, field: Field, camera: Camera, frame: int, color: np.ndarray, device: str = "cpu"
-) -> np.ndarray:
-    """A frame of the clip, re-rendered, sRGB 0-255, (H, W, 3) uint8; color: the Gaussians' then, sRGB 0-1, (G, 3)."""
-    moved = replace(deform(scene, field, frame / camera.fps), color=color)
-    return to_bytes(render(*drawn(moved), camera, device=device).rgb)

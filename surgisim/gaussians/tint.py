@@ -44,8 +44,3 @@ def tint(at_knots: Sequence[Sequence[torch.Tensor]], gone: Sequence[float]) -> t
     shared = iter(torch._foreach_mul([a for a, _ in parts], [share for _, share in parts]))
     each = [[next(shared) for _ in one] for one in told]
     return torch.stack([torch.stack(one).sum(0) if one else nothing for one in each])
-
-
-def tinted(color: np.ndarray, at_knots: np.ndarray, gone: float) -> np.ndarray:
-    """Colours, sRGB 0-1, (G, 3), as they are then; at_knots: what is added at each knot, (K, G, 3)."""
-    return color + sum((np.float32(share) * at_knots[k] for k, share in shares(gone, len(at_knots)).items()), 0.0)

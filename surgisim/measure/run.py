@@ -26,6 +26,7 @@ class OfScene:
 
     frames: Frames
     camera: Camera
+    given: Given
     masks: Masks
     inpainted: Inpainted
     depth: Depth

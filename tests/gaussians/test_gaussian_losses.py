@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from surgisim.gaussians.losses import anisotropic, followed, masked_l1, total_variation, trajectory
+from surgisim.gaussians.losses import anisotropic, followed, masked_l1, structure, total_variation, trajectory
 from surgisim.gaussians.neighbours import groups, nearest
+from surgisim.measure.ssim import ssim
 from surgisim.problem import Problem
 
 rng = np.random.default_rng(4)
@@ -109,3 +110,39 @@ def test_points_at_one_place_are_each_others_neighbours_and_never_their_own():
 def test_more_neighbours_than_there_are_points_are_refused(k):
     with pytest.raises(Problem, match=rf"{k} neighbours are wanted for each of 4 points"):
         nearest(np.eye(4, 3), k)
+
+
+def test_structure_is_what_the_metric_says_of_pictures():
+    reference = rng.integers(0, 256, (24, 31, 3)).astype(np.uint8)
+    drawn = np.clip(reference + rng.normal(0, 25, reference.shape), 0, 255).astype(np.uint8)
+    # Black around both: what lies past an image's edge is made up, and by each otherwise.
+    drawn, reference = (np.pad(a, [(6, 6), (6, 6), (0, 0)]) for a in (drawn, reference))
+    whole = np.ones((1, *reference.shape[:2]))
+    pair = (torch.tensor(a[None] / 255) for a in (drawn, reference))
+    assert 1 - float(structure(*pair, torch.tensor(whole))) == pytest.approx(
+        ssim(drawn, reference, whole[0] > 0), abs=1e-6
+    )
+
+
+def test_structure_counts_nothing_of_what_does_not_count():
+    drawn, seen = torch.rand(2, 2, 16, 20, 3, dtype=torch.float64).unbind(0)
+    mask = torch.zeros(2, 16, 20, dtype=torch.float64)
+    mask[:, :, :10] = 1
+    other = torch.where(mask[..., None] > 0, drawn, torch.rand_like(drawn))
+    assert float(structure(drawn, seen, mask)) == float(structure(other, seen, mask)) > 0.1
+    assert float(structure(drawn, seen, 0 * mask)) == 0
+    assert float(structure(seen, seen, mask)) == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU")
+def test_structure_is_the_same_on_cuda():
+    drawn = torch.rand(2, 40, 50, 3) * 0.02 + 0.7
+    seen, mask = (drawn + 0.005 * torch.randn_like(drawn)).clamp(0, 1), torch.rand(2, 40, 50)
+    there = structure(drawn.cuda(), seen.cuda(), mask.cuda())
+    assert float(there) == pytest.approx(float(structure(*(a.double() for a in (drawn, seen, mask)))), abs=1e-4)
+
+
+def test_the_slope_of_structure_is_that_of_differences():
+    drawn, seen = torch.rand(2, 1, 12, 13, 1, dtype=torch.float64).unbind(0)
+    mask = torch.rand(1, 12, 13, dtype=torch.float64)
+    assert torch.autograd.gradcheck(lambda image: structure(image, seen, mask), (drawn.requires_grad_(),))

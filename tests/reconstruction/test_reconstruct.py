@@ -251,5 +251,5 @@ def test_what_no_frame_tells_lies_half_way_between_its_neighbours(clip, fit):
             fit.step(PHASES[0], fit.next_frames(PHASES[0], i), i)
         with torch.no_grad():
             off[weight] = float(fit.off_midway(fit.current_field(), turn=0))
-    assert fit.unseen[0] * clip.camera.fps == pytest.approx(1)
+    assert fit.unseen[0] == 1
     assert 0 < off[1.0] < 0.6 * off[0.0]

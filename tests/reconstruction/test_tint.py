@@ -7,8 +7,9 @@ import pytest
 from test_reconstruct import parts
 
 from surgisim.deformation.field import displace, load_field
+from surgisim.gaussians.play import Play
 from surgisim.gaussians.reconstruct import reconstruct
-from surgisim.gaussians.tint import clock, knots, shares, tinted
+from surgisim.gaussians.tint import clock, knots, shares
 
 
 @pytest.mark.parametrize("count", [1, 4, 7])
@@ -20,11 +21,13 @@ def test_shares_begin_at_nothing_and_go_on_evenly(count):
     assert shares(1.0, count) == {count - 1: 1.0}
 
 
-def test_colours_at_a_knot_are_its_own_and_between_two_the_middle():
-    color, at_knots = np.full((3, 3), 0.4), np.random.default_rng(0).normal(size=(5, 3, 3)).astype(np.float16)
-    assert np.allclose(tinted(color, at_knots, 0.4), color + at_knots[1])
-    assert np.allclose(tinted(color, at_knots, 0.5), color + (at_knots[1] + at_knots[2].astype(float)) / 2, atol=1e-3)
-    assert np.array_equal(tinted(color, at_knots, 0.0), color)
+def test_colours_at_a_knot_are_its_own_and_between_two_the_middle(fit):
+    at_knots = np.random.default_rng(0).normal(size=(5, len(fit.adam.tensors["mean"]), 3)).astype(np.float16)
+    scene, field, _ = fit.result()
+    play = Play(scene, field, np.array([0, 0.5, 1.0]), at_knots, fit.camera)
+    assert np.allclose(play.colors(0.4), scene.color + at_knots[1], atol=1e-6)
+    assert np.allclose(play.colors(0.5), scene.color + (at_knots[1] + at_knots[2].astype(float)) / 2, atol=1e-3)
+    assert np.array_equal(play.colors(0.0), scene.color)
 
 
 def test_what_lies_between_two_frames_that_are_looked_at_is_half_way():
@@ -36,11 +39,12 @@ def test_what_lies_between_two_frames_that_are_looked_at_is_half_way():
 def test_scales_are_one_at_the_frames_that_are_looked_at(fit):
     for k, name in enumerate(fit.tint):
         fit.adam.tensors[name] += 0.01 * (k + 1)
-    scene, _, at_knots = fit.result()
+    scene, field, at_knots = fit.result()
+    play = Play(scene, field, fit.moments, at_knots, fit.camera)
     assert len(at_knots) == len(fit.moments) - 1 > len(fit.tints[0])
     for time in fit.moments:
         gone = clock(time, fit.moments)
-        assert np.allclose(tinted(scene.color, at_knots, gone), scene.color + fit.added([gone])[0].numpy(), atol=1e-6)
+        assert np.allclose(play.colors(time), scene.color + fit.added([gone])[0].numpy(), atol=1e-6)
 
 
 def test_there_are_knots_for_any_clip():

@@ -46,6 +46,7 @@ rule scene_score:
     input:
         frames=upstream("ingest", "frames.npz"),
         camera=upstream("ingest", "camera.json"),
+        given=upstream("ingest", "given.npz"),
         masks=upstream("masking", "masks.npz"),
         inpainted=upstream("inpainting", "inpainted.npz"),
         depth=upstream("depth", "depth.npz"),
@@ -76,7 +77,7 @@ rule scene_score:
         code=code("scene_score"),
     shell:
         'python "$SURGISIM/stages/scene_score.py"'
-        " --frames {input.frames} --camera {input.camera} --masks {input.masks}"
+        " --frames {input.frames} --camera {input.camera} --given {input.given} --masks {input.masks}"
         " --inpainted {input.inpainted} --depth {input.depth} --tracks {input.tracks}"
         " --scene {input.scene} --deformation {input.deformation} --rendered {input.rendered}"
         " {params.truth} --benchmarks {params.benchmarks} --metrics {output.metrics}"

@@ -6,10 +6,13 @@ import numpy as np
 
 from surgisim.artifacts.frames import BETWEEN
 from surgisim.measure.groups.pictures import WHEN, mean, parts_of, pictures, table
-from surgisim.measure.lpips import Lpips
+from surgisim.measure.lpips import SMALLEST, Lpips
 from surgisim.measure.number import number
 from surgisim.measure.psnr import psnr
 from surgisim.measure.run import OfScene, Run
+from surgisim.measure.ssim import ssim
+
+BLACK_AS = "as Deform3DGS (metrics.py at 8bc37de) and those who compare with it count"
 
 
 def reconstruction(run: Run | OfScene, lpips: Lpips | None, first: int) -> dict[str, dict[str, Any]]:
@@ -30,33 +33,37 @@ def reconstruction(run: Run | OfScene, lpips: Lpips | None, first: int) -> dict[
             "held out between used frames; all but true tool pixels",
         )
     early = {f"first_{count}": (np.arange(len(run.frames.rgb)) < count, f"the first {count} frames, used or not")}
-    return numbers | table(drawn, parts_of(run.frames.split) | early) | _otherwise(run) | still(run)
+    return numbers | table(drawn, parts_of(run.frames.split) | early) | _otherwise(run, lpips) | still(run)
 
 
-def _otherwise(run: Run | OfScene) -> dict[str, dict[str, Any]]:
-    """PSNR between used frames as others count it."""
+def _otherwise(run: Run | OfScene, lpips: Lpips | None) -> dict[str, dict[str, Any]]:
+    """Pictures between used frames as others count them."""
     between = np.flatnonzero(run.frames.split == BETWEEN)
-    outside = ~run.masks.tool[between]
+    counted = ~run.masks.tool[between]
     pairs = [(run.rendered.rgb[t], run.frames.rgb[t]) for t in between]
-    everywhere = np.ones(outside.shape[1:], bool)
+    outside = [psnr(*pair, here) for pair, here in zip(pairs, counted, strict=True)]
+    if len(run.given.depth):
+        counted = counted & (run.given.depth[between] > 0)
+    black = [[p * here[..., None] for p in pair] for pair, here in zip(pairs, counted, strict=True)]
+    whole = np.ones(run.frames.rgb.shape[1:3], bool)
+    words = (
+        "whole frames, black in both where the instrument is and where no depth came with a recording that has depth"
+    )
+    lpips = lpips if min(whole.shape) >= SMALLEST else None
     ways = {
-        "outside": (
-            [psnr(*pair, here) for pair, here in zip(pairs, outside, strict=True)],
-            "all pixels but the instrument's, its rim and highlights too",
-        ),
-        "black": (
-            [psnr(*(p * m[..., None] for p in pair), everywhere) for pair, m in zip(pairs, outside, strict=True)],
-            "whole frames with the instrument black in both, as EndoNeRF's evaluation and what follows it count",
-        ),
+        "psnr_between_outside": (outside, "dB", "all pixels but the instrument's, its rim and highlights too"),
+        "psnr_between_black": ([psnr(*pair, whole) for pair in black], "dB", f"{words}, {BLACK_AS}"),
+        "ssim_between_black": ([ssim(*pair, whole) for pair in black], "1", f"{words}, {BLACK_AS}"),
+        "lpips_between_black": ([lpips(*pair, whole) for pair in black] if lpips else [], "1", f"{words}, {BLACK_AS}"),
     }
     return {
-        f"psnr_between_{name}": number(
+        name: number(
             mean(np.array(each)),
-            "dB",
+            unit,
             f"mean over {WHEN['between'][1]}; {words}",
-            why_not=f"there are no {WHEN['between'][1]}",
+            why_not=f"there are no {WHEN['between'][1]}" if len(between) == 0 else "no weights, or frames too small",
         )
-        for name, (each, words) in ways.items()
+        for name, (each, unit, words) in ways.items()
     }
 
 
