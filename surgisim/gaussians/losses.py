@@ -40,7 +40,7 @@ def structure(value: torch.Tensor, target: torch.Tensor, mask: torch.Tensor) -> 
     maps = torch.stack([drawn, seen, drawn * drawn, seen * seen, drawn * seen]).flatten(0, 2)[:, None]
     maps = torch.nn.functional.pad(maps, [SSIM_RADIUS] * 4, mode="reflect")
     # A variance is a small difference of large numbers, which a GPU's short floats do not hold.
-    with torch.backends.cudnn.flags(allow_tf32=False):
+    with torch.backends.cudnn.flags(enabled=True, allow_tf32=False):
         for kernel in (window[None, None, None], window[None, None, :, None]):
             maps = torch.nn.functional.conv2d(maps, kernel)
     a, b, aa, bb, ab = maps.unflatten(0, (5, *seen.shape[:2])).squeeze(3).unbind(0)
