@@ -51,6 +51,22 @@ def test_a_good_run_scores_well(values):
     assert values["replay"]["sane"]["value"] == 1
 
 
+def test_pixels_that_are_black_in_both_count_as_right_where_others_count_so(made):
+    frames, tool = made["frames"], made["masks"].tool
+    off = np.where(frames.rgb < 128, frames.rgb + 10, frames.rgb - 10).astype(np.uint8)
+    depth = np.ones(tool.shape, np.float32)
+    depth[:, :, :12] = 0
+    drawn = dataclasses.replace(frames, rgb=off)
+    given = dataclasses.replace(made["given"], depth=depth)
+    of = score(run_of(made, rendered=drawn, given=given), lpips=None, first=4)["reconstruction"]
+    share = (~tool & (depth > 0))[frames.split == 1].mean((1, 2))
+    assert tool[frames.split == 1].any()
+    assert of["psnr_between_outside"]["value"] == pytest.approx(20 * np.log10(25.5))
+    assert of["psnr_between_black"]["value"] == pytest.approx(20 * np.log10(25.5) - 10 * np.log10(share).mean())
+    assert of["ssim_between_black"]["value"] > 0.2 * share.min()
+    assert "lpips_between_black" not in of
+
+
 def test_a_replay_nine_tenths_as_far_is_a_tenth_off(values):
     moving = values["simulation"]["true_used_moving"]["value"]
     still = values["simulation"]["true_used_moving_still"]["value"]
