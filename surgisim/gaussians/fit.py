@@ -23,8 +23,8 @@ from surgisim.gaussians.straight import off_midway, straightness
 from surgisim.gaussians.tint import clock, knots, tint
 from surgisim.problem import Problem
 
-RENEWALS = (0.1, 0.2, 0.3, 0.4)
-"""When Gaussians are dropped and split [fraction of iterations]."""
+RENEWALS = (0.2, 0.4, 0.6, 0.8)
+"""When Gaussians are dropped and split [fraction of the phases in which both scene and field move]."""
 SPLIT = 0.1
 """Largest share of the Gaussians split at once."""
 WIDEST = 10.0
@@ -84,7 +84,7 @@ class Fit:
     def run(self, progress: Say) -> np.ndarray:
         """All iterations; returns the history, (R, 5)."""
         total = self.settings.iterations
-        renewals = {round(share * total) for share in RENEWALS}
+        renewals = {round(share * self.settings.phases[1] * total) for share in RENEWALS}
         every = max(total // REPORTS, 1)
         history, rows, steps = [], [], []
         for i in range(total):
@@ -146,7 +146,7 @@ class Fit:
             moved, opacity, turn, grow = field.at(mean, times)
         added = self.added([clock(time, self.moments) for time in times]) if shown else torch.zeros_like(moved)
         radius = (adam.tensors["scale"] + grow).exp()
-        recorded = iteration < RENEWALS[-1] * self.settings.iterations
+        recorded = iteration < RENEWALS[-1] * self.settings.phases[1] * self.settings.iterations
         on_cpu = self.device.type == "cpu"
         probe = torch.zeros(*moved.shape[:2], 2, device=self.device, requires_grad=recorded)
         image = rasterise(
