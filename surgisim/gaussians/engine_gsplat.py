@@ -17,6 +17,9 @@ from surgisim.gaussians.projection import LOW_PASS
 from surgisim.gaussians.rasterise import NEAR
 from surgisim.problem import Problem
 
+UPRIGHT = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))
+"""The camera's pose: its frame is the world's."""
+
 
 def rasterise(
     mean: torch.Tensor,
@@ -124,13 +127,8 @@ def _draw(mean, rotation, scale, opacity, color, camera, background, near, mode)
 
 def _views(camera: Camera, device: torch.device) -> tuple[torch.Tensor, torch.Tensor]:
     """The camera's pose and lens as gsplat wants them, (1, 4, 4) and (1, 3, 3): pixel centres lie at halves there."""
-    lens = camera.matrix
-    lens[:2, 2] += 0.5
-    return _constant((_rows(np.eye(4)),), device), _constant((_rows(lens),), device)
-
-
-def _rows(matrix: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    return tuple(map(tuple, matrix.tolist()))
+    lens = (camera.fx, 0.0, camera.cx + 0.5), (0.0, camera.fy, camera.cy + 0.5), (0.0, 0.0, 1.0)
+    return _constant((UPRIGHT,), device), _constant((lens,), device)
 
 
 @lru_cache(maxsize=64)
