@@ -16,19 +16,19 @@ from surgisim.deformation.field import Field
 
 STILL = 0.001
 """e: what a frame's motion is made of at least, for tracks are no better [longest image side]."""
-TINY = 1e-20
-"""Keeps the mean over nothing at 0."""
+UNTOLD = 0.1
+"""s in a frame that nothing tells of: asked for more, a field that pictures alone tell of goes wrong."""
 
 
 def straightness(frame: np.ndarray, unseen: np.ndarray, went: torch.Tensor, sure: torch.Tensor) -> torch.Tensor:
-    """s of frame 0's pixels where nothing is looked at, (N, H, W), half precision; 1 in a frame that nothing tells of.
+    """s of frame 0's pixels where nothing is looked at, (N, H, W), half precision; UNTOLD where nothing tells of it.
 
     frame: numbers of the frames that are looked at, (U,); unseen: of the others, before the last of these, (N,).
     went: how far frame 0's pixels were seen to go in the first [px], (U, H, W, 2). sure: how much that counts, 0-1,
     (U, H, W).
     """
     last, side = len(frame) - 1, max(went.shape[1:3])
-    out = torch.ones(len(unseen), *went.shape[1:3], dtype=went.dtype, device=went.device)
+    out = torch.full((len(unseen), *went.shape[1:3]), UNTOLD, dtype=went.dtype, device=went.device)
     for k, t in enumerate(unseen):
         b = int(np.searchsorted(frame, t))
         a = b - 1
@@ -37,8 +37,9 @@ def straightness(frame: np.ndarray, unseen: np.ndarray, went: torch.Tensor, sure
         before, after = ((went[j] - went[i]).float() / (frame[j] - frame[i]) for i, j in ((a - 1, a), (b, b + 1)))
         bent, most = (after - before).norm(dim=-1), after.norm(dim=-1) + before.norm(dim=-1) + STILL * side
         known = sure[a - 1 : b + 2].amin(0).float()
-        together = (known * bent).sum() / (known * most).sum().clamp(min=TINY)
-        out[k] = (1 - torch.lerp(together, bent / most, known)).square()
+        if known.any():
+            together = (known * bent).sum() / (known * most).sum()
+            out[k] = (1 - torch.lerp(together, bent / most, known)).square()
     return out
 
 
