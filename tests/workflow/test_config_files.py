@@ -36,6 +36,15 @@ def test_the_schemas_accept_the_project_and_refuse_what_is_extra():
         jsonschema.validate({"ingest": {"sise": 3}}, made["config.schema.json"])
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "config" / "protocols").glob("*.yaml")), ids=lambda path: path.stem)
+def test_protocols_are_settings_that_differ_from_the_defaults(path):
+    changes = yaml.safe_load(path.read_text())
+    assert Whole.model_validate(changes) != Whole()
+    for stage, settings in changes.items():
+        same = [key for key, value in settings.items() if value == group(stage).model_fields[key].default]
+        assert not same, f"{stage}: {same} are the defaults"
+
+
 def test_no_schema_object_allows_extra_keys():
     def objects(node):
         if isinstance(node, dict):
