@@ -32,8 +32,8 @@ WIDEST = 10.0
 SMALLEST_UNIT = 2.0
 """What r_m is counted in at least [median first radius]: a scene of few Gaussians still has to be closed."""
 TRAJECTORY_EVERY = 2
-"""Iterations from one to the next that counts the trajectory term, as many times over: it costs as much as the whole
-field once more."""
+"""Iterations from one to the next that counts the trajectory term, as many times over: it asks for the field at one
+moment more."""
 SMOOTHED_EVERY = 4
 """Iterations from one to the next that counts how rough the field is, as many times over."""
 WEIGHED_EVERY = 2
@@ -143,7 +143,8 @@ class Fit:
         mean, color = adam.tensors["mean"], adam.tensors["color"]
         # A frozen field carries on what moves by little; what it would say of its own slope is left out.
         with torch.set_grad_enabled(phase.moves_field):
-            moved, opacity, turn, grow = field.at(mean, times)
+            carried, *others = field.at(mean, [*times, *self.earlier(phase, times, iteration)])
+        moved, opacity, turn, grow = (change[: len(times)] for change in (carried, *others))
         added = self.added([clock(time, self.moments) for time in times]) if shown else torch.zeros_like(moved)
         radius = (adam.tensors["scale"] + grow).exp()
         recorded = iteration < RENEWALS[-1] * self.settings.phases[1] * self.settings.iterations
@@ -162,7 +163,7 @@ class Fit:
             checked=on_cpu,
         )
         seen = self.seen.of(frames)
-        loss = self.misfit(phase, image, seen) + self.priors(phase, field, radius, moved, seen, iteration)
+        loss = self.misfit(phase, image, seen) + self.priors(phase, field, radius, carried, seen, iteration)
         if shown and self.settings.tint:
             loss = loss + self.settings.tint * added.abs().mean()
         # Frame 0 says nothing of the field.
@@ -205,11 +206,25 @@ class Fit:
         depth = masked_l1(image.depth / self.middle, seen.z / self.middle * image.alpha, seen.trust)
         return color + settings.depth * depth
 
+    def earlier(self, phase: Phase, times: Sequence[float], iteration: int) -> list[float]:
+        """The moment [s] from which the trajectory term measures, a frame before the last of `times` at which anything
+        moves, where it counts in this iteration. One of several frames does for all."""
+        due = phase.trajectory and self.settings.trajectory and iteration % TRAJECTORY_EVERY == 0
+        return [t - 1 / self.camera.fps for t in times if t > 0][-1:] if due else []
+
     def priors(
-        self, phase: Phase, field: Field, radius: torch.Tensor, moved: torch.Tensor, seen: Observations, iteration: int
+        self,
+        phase: Phase,
+        field: Field,
+        radius: torch.Tensor,
+        carried: torch.Tensor,
+        seen: Observations,
+        iteration: int,
     ) -> torch.Tensor:
-        """What is asked of scene and field besides the picture."""
+        """What is asked of scene and field besides the picture; carried: dmu in the B frames seen [m], (B, G, 3), and
+        then at the moment `earlier` than one of them, if there is one."""
         settings, times = self.settings, seen.frame / self.camera.fps
+        moved, before = carried[: len(times)], carried[len(times) :]
         total = radius.new_zeros(())
         if settings.anisotropy:
             limits = {"r_m": settings.anisotropy_largest, "r_ani": settings.anisotropy_ratio}
@@ -220,17 +235,13 @@ class Fit:
             total = total + SMOOTHED_EVERY * smoothness
         if not times.any():
             return total
-        if phase.trajectory and settings.trajectory and iteration % TRAJECTORY_EVERY == 0:
+        if len(before):
             if self.groups is None:
                 points = self.adam.tensors["mean"].detach().cpu().numpy()
                 self.groups = torch.from_numpy(groups(points, settings.neighbours)).to(self.device)
-            # One of several frames does for all: it asks for the field once more.
-            k = np.flatnonzero(times)[-1]
-            before = field(self.adam.tensors["mean"], times[k] - 1 / self.camera.fps)[0]
+            step = (moved[np.flatnonzero(times)[-1]] - before[0]) / self.radius
             literal = settings.trajectory_form == "literal"
-            total = total + TRAJECTORY_EVERY * settings.trajectory * trajectory(
-                (moved[k] - before) / self.radius, self.groups, literal=literal
-            )
+            total = total + TRAJECTORY_EVERY * settings.trajectory * trajectory(step, self.groups, literal=literal)
         if phase.moves_field and settings.correspondence:
             total = total + settings.correspondence * self.astray(moved, seen)
         if phase.moves_field and settings.midway and len(self.unseen) and iteration % MIDWAY_EVERY == 0:

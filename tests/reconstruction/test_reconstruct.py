@@ -169,9 +169,10 @@ def test_the_trajectory_term_acts_every_other_iteration_of_its_phases(clip, fit,
         for settings in (clip.settings, calm):
             fit.settings = settings
             field, mean = fit.current_field(), fit.adam.tensors["mean"]
-            moved, _, _, grow = field.at(mean, [fit.seen.frame[4] / clip.camera.fps])
-            radius = (fit.adam.tensors["scale"] + grow).exp()
-            values.append(fit.priors(phase, field, radius, moved, fit.seen.of([4]), iteration).item())
+            times = [fit.seen.frame[4] / clip.camera.fps]
+            carried, _, _, grow = field.at(mean, times + fit.earlier(phase, times, iteration))
+            radius = (fit.adam.tensors["scale"] + grow[:1]).exp()
+            values.append(fit.priors(phase, field, radius, carried, fit.seen.of([4]), iteration).item())
         assert (values[0] > values[1]) == (phase.trajectory and iteration != 1)
 
 
