@@ -25,8 +25,10 @@ from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.deformation import Deformation
 from surgisim.artifacts.scene import Scene
 from surgisim.deformation.field import load_field
+from surgisim.gaussians.engine_gsplat import lacking
 from surgisim.gaussians.play import Play
 from surgisim.gaussians.rasterise import rasterise
+from surgisim.problem import Problem
 
 CASES = ((10_000, 160, 128), (20_000, 160, 128), (20_000, 320, 250), (50_000, 640, 512))
 CASES_ON_GPU = (*CASES[1:], (100_000, 640, 512))
@@ -143,4 +145,10 @@ if __name__ == "__main__":
     asked.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
     asked.add_argument("--clip", type=Path, help="folder with scene.ply, deformation.npz and camera.json")
     told = asked.parse_args()
-    print(json.dumps(of_clip(told.clip) if told.clip else on_gpu() if told.device == "cuda" else benchmark(), indent=1))
+    if told.device == "cuda" and (missing := lacking()):
+        asked.error(f"--device cuda needs {missing}, which this machine lacks; leave it out.")
+    try:
+        found = of_clip(told.clip) if told.clip else on_gpu() if told.device == "cuda" else benchmark()
+    except Problem as problem:
+        asked.error(str(problem))
+    print(json.dumps(found, indent=1))
