@@ -72,7 +72,7 @@ class Reconstruction(Settings):
     """Weight of the squared colour misfit beside the absolute one, of colours 0-1: few pixels that are far off, such as
     highlights, are what PSNR counts [1]."""
     structure: float = Field(0.2, ge=0)
-    """Weight of one minus the structural similarity, once colours may change: pictures stay sharp [1]."""
+    """Weight of one minus the structural similarity, in the last phase: pictures stay sharp [1]."""
     depth: float = Field(0.5, ge=0)
     """Weight of the depth misfit [1/median depth]."""
     tint: float = Field(0.01, ge=0)

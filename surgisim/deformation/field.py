@@ -16,7 +16,6 @@ import numpy as np
 import torch
 
 from surgisim.artifacts.deformation import Deformation
-from surgisim.artifacts.scene import Scene
 from surgisim.deformation.planes import Layout, features
 from surgisim.deformation.sheets import Sheets
 from surgisim.deformation.smoothness import roughness
@@ -160,21 +159,6 @@ def load_field(deformation: Deformation) -> Field:
     )
     low, high = deformation.low.astype(float), deformation.high.astype(float)
     return Field(layout, low, high, torch.from_numpy(deformation.planes.copy()), head)
-
-
-def deform(scene: Scene, field: Field, time: float) -> Scene:
-    """The canonical scene as it is at `time` [s]; at 0 it is itself."""
-    with torch.no_grad():
-        mean = torch.from_numpy(scene.mean).to(field.planes.device)
-        moved, opacity, turn, grow = (a.cpu().numpy() for a in field(mean, time))
-    rotation = scene.rotation + turn
-    return Scene(
-        mean=scene.mean + moved,
-        opacity=scene.opacity + opacity,
-        scale=scene.scale + grow,
-        rotation=rotation / np.linalg.norm(rotation, axis=1, keepdims=True),
-        color=scene.color,
-    )
 
 
 def displace(points: np.ndarray, field: Field, time: float) -> np.ndarray:

@@ -27,8 +27,12 @@ class Play:
         self.tint = torch.from_numpy(tint).to(self.device)
 
     @torch.no_grad()
-    def rgb(self, time: float) -> torch.Tensor:
-        """The picture at `time` [s], sRGB, colours outside of 0-1 not cut, (H, W, 3)."""
+    def rgb(self, time: float, *, checked: bool = True) -> torch.Tensor:
+        """The picture at `time` [s], sRGB, colours outside of 0-1 not cut, (H, W, 3).
+
+        checked: whether values are looked at first, which waits for all that a GPU still does; raises Problem then for
+        those that are not finite.
+        """
         moved, opacity, turn, grow = self.field(self.mean, time)
         return rasterise(
             self.mean + moved,
@@ -39,7 +43,7 @@ class Play:
             self.camera,
             engine=engine_on(self.device),
             weigh=False,
-            checked=False,
+            checked=checked,
         ).rgb
 
     def colors(self, time: float) -> torch.Tensor:

@@ -60,10 +60,10 @@ def _otherwise(run: Run | OfScene, lpips: Lpips | None) -> dict[str, dict[str, A
         name: number(
             mean(np.array(each)),
             unit,
-            f"mean over {WHEN['between'][1]}; {words}",
+            f"mean over {WHEN['between'][1]}; {how}",
             why_not=f"there are no {WHEN['between'][1]}" if len(between) == 0 else "no weights, or frames too small",
         )
-        for name, (each, unit, words) in ways.items()
+        for name, (each, unit, how) in ways.items()
     }
 
 
