@@ -49,6 +49,13 @@ class Tree:
         jobs = [e for e in events if e["event"] == "job_info"]
         return {(job["rule_name"], *job["wildcards"].values()) for job in jobs if job["rule_name"] != "all"}
 
+    def commands(self, *arguments: str) -> list[str]:
+        """The shell command of every job that a dry run would start."""
+        said = self._snakemake("--dry-run", "--printshellcmds", *arguments)
+        assert said.returncode == 0, said.stdout
+        events = [json.loads(line) for line in said.stdout.splitlines() if line.startswith('{"event"')]
+        return [event["text"] for event in events if event["event"] == "shellcmd"]
+
     def rules(self, *arguments: str) -> set[str]:
         return {job[0] for job in self.plan(*arguments)}
 

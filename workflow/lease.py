@@ -1,10 +1,12 @@
 """Run a command with GPUs of its own: `python lease.py COUNT COMMAND...`.
 
-Snakemake counts GPUs but does not hand them out. A file lock per GPU does; it falls with the process,
-however that ends. Under SLURM the scheduler has already handed them out.
+Snakemake counts GPUs but does not hand them out. A file lock per place on a GPU does; it falls with the process,
+however that ends. A GPU has one place, or more where more jobs may compute at once (SURGISIM_GPU_JOBS) than there are
+GPUs. Under SLURM the scheduler has already handed them out.
 """
 
 import fcntl
+import itertools
 import os
 import subprocess
 import sys
@@ -23,16 +25,20 @@ def main(count: int, command: list[str]) -> None:
 
 
 def _take(count: int) -> list[str]:
-    """Names of `count` free GPUs, waited for; the locks live as long as this process."""
+    """Names of `count` GPUs with a free place, the emptiest first, waited for; the locks live as long as this
+    process."""
     known = gpus()
     if len(known) < count:
         sys.exit(f"error: {count} GPUs are wanted and this machine shows {len(known)}. Use --profile default.")
+    places = max(-(-int(os.environ.get("SURGISIM_GPU_JOBS", "0")) // len(known)), 1)
     folder = Path(tempfile.gettempdir()) / f"surgisim-gpus-{os.getuid()}"
     folder.mkdir(exist_ok=True)
     while True:
         taken: dict[str, int] = {}
-        for name in known:
-            handle = os.open(folder / name, os.O_RDWR | os.O_CREAT)
+        for place, name in itertools.product(range(places), known):
+            if name in taken:
+                continue
+            handle = os.open(folder / f"{name}-{place}", os.O_RDWR | os.O_CREAT)
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:

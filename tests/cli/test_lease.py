@@ -17,9 +17,10 @@ def lend(tmp_path):
     environment = os.environ | {"CUDA_VISIBLE_DEVICES": "3,5", "TMPDIR": str(tmp_path)}
     environment.pop("SLURM_JOB_ID", None)
 
-    def start(count: int, seconds: float = 0.0) -> subprocess.Popen:
+    def start(count: int, seconds: float = 0.0, at_once: int = 2) -> subprocess.Popen:
         command = [sys.executable, str(LEASE), str(count), sys.executable, "-c", SHOW, str(seconds)]
-        return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        told = environment | {"SURGISIM_GPU_JOBS": str(at_once)}
+        return subprocess.Popen(command, env=told, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     return start
 
@@ -36,6 +37,15 @@ def test_two_jobs_get_different_gpus_and_a_third_waits(lend):
     assert lend(1).communicate()[0].strip() in held
     assert time.monotonic() - began > 0.5
     first.wait(), second.wait()
+
+
+def test_more_jobs_at_once_than_gpus_share_them_evenly(lend):
+    jobs = []
+    for gpu in ("3", "5", "3", "5"):
+        jobs.append(lend(1, 5.0, at_once=4))
+        assert jobs[-1].stdout.readline().strip() == gpu
+    assert lend(2, at_once=4).communicate()[0].strip() in ("3,5", "5,3")
+    assert all(job.wait() == 0 for job in jobs)
 
 
 def test_a_killed_job_gives_its_gpus_back(lend):

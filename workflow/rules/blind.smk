@@ -173,7 +173,7 @@ rule diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=diagnosing,
+        settings=placed(diagnosing),
         work=work,
         code=code("diagnosis"),
     shell:

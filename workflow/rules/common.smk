@@ -91,11 +91,15 @@ wildcard_constraints:
     variant="|".join(PLAN.variants),
 
 
+# How many jobs may compute on GPUs at once, for lease.py.
+AT_ONCE = workflow.global_resources.get("gpu")
+
 # Snakemake passes a job's threads on as OMP_NUM_THREADS only (OpenCV would take all of a machine, beside frames that are
 # worked on side by side already); and a stage must run with this checkout's library.
 shell.prefix(
     "set -euo pipefail; export NUMBA_NUM_THREADS=$OMP_NUM_THREADS OPENCV_FOR_THREADS_NUM=1"
     " MPLBACKEND=Agg PYTHONHASHSEED=0 PYTHONFAULTHANDLER=1"
+    f" SURGISIM_GPU_JOBS={AT_ONCE.value if AT_ONCE else 0}"
     f" SURGISIM='{ROOT}' PYTHONPATH='{ROOT}' PATH='{Path(sys.executable).parent}':$PATH; "
 )
 
@@ -124,7 +128,20 @@ def upstream(stage, name):
 
 def settings(stage):
     """Params function: the slice of the settings this stage may read, and nothing else."""
-    return lambda w: PLAN.slices[stage, w.clip, w.variant]
+    return placed(lambda w: PLAN.slices[stage, w.clip, w.variant])
+
+
+def placed(chosen):
+    """Params function: what `chosen` says, on the GPU where the profile gives the job one (`set-resources`)."""
+
+    def of(wildcards, resources):
+        said = chosen(wildcards)
+        told = json.loads(said)
+        if not (resources.get("gpu", 0) and "device" in told):
+            return said
+        return json.dumps(told | {"device": "cuda"}, sort_keys=True)
+
+    return of
 
 
 def products(rules):

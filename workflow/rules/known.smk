@@ -51,7 +51,7 @@ rule known_diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=diagnosing,
+        settings=placed(diagnosing),
         work=work,
         code=code("diagnosis"),
     shell:

@@ -28,10 +28,12 @@ rule scene_again:
         mem_mb=4000,
         gpu=0,
     params:
-        settings=lambda w: json.dumps(
-            json.loads(PLAN.slices["reconstruction", w.clip, w.variant])
-            | {"seed": int(w.again)},
-            sort_keys=True,
+        settings=placed(
+            lambda w: json.dumps(
+                json.loads(PLAN.slices["reconstruction", w.clip, w.variant])
+                | {"seed": int(w.again)},
+                sort_keys=True,
+            )
         ),
         code=code("reconstruction"),
     shell:
