@@ -7,7 +7,7 @@ Gaussian that would bring T below 1e-4 is left out. It builds its kernels with n
 
 import importlib.util
 import shutil
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 import torch
@@ -85,8 +85,10 @@ def draw_factors(
     return rgb.cpu().numpy(), alpha.cpu().numpy()
 
 
+@cache
 def lacking() -> str:
-    """What the engine misses on this machine, in words; empty when it can run."""
+    """What the engine misses on this machine, in words; empty when it can run. Looked for once, not for
+    each picture."""
     if not torch.cuda.is_available():
         return "a CUDA device"
     if importlib.util.find_spec("gsplat") is None:
@@ -103,8 +105,9 @@ def _draw(mean, rotation, scale, opacity, color, camera, background, near, mode)
     from gsplat import rasterization
 
     sets = mean.shape[:-2]
-    shared = *_views(camera, mean.device), _constant((background,), mean.device)
-    view, lens, behind = (a.expand(*sets, *a.shape) for a in shared)
+    view, lens = (a.expand(*sets, *a.shape) for a in _views(camera, mean.device))
+    # Black is what gsplat draws on by itself, with less to do.
+    behind = _constant((background,), mean.device).expand(*sets, 1, len(background)) if any(background) else None
     image, alpha, facts = rasterization(
         mean,
         rotation,

@@ -139,6 +139,7 @@ def test_several_sets_at_once_are_drawn_as_one_by_one(engine, device):
 
     together = drawn([torch.stack(each) for each in zip(*clouds, strict=True)])
     alone = [drawn(each) for each in clouds]
-    for kind, close in ((0, {"rtol": 1e-5, "atol": 1e-6}), (1, {"rtol": 1e-4, "atol": 1e-5})):
+    # A GPU adds in another order each time.
+    for kind, most in ((0, {"cpu": 1e-7, "cuda": 1e-5}), (1, {"cpu": 1e-6, "cuda": TOLERANCE["cuda"]})):
         for several, each in zip(together[kind], zip(*(single[kind] for single in alone), strict=True), strict=True):
-            torch.testing.assert_close(several, torch.stack(each), **close)
+            assert distance(several, torch.stack(each)) < most[device]

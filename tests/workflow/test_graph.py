@@ -58,6 +58,14 @@ def test_the_papers_tables_ask_for_their_runs_and_for_scenes_with_several_seeds(
         assert {tuple(sorted(where)) for where in made[rule]} == {tuple(sorted(("demo", *w))) for w in wanted}
 
 
+def test_a_film_has_no_depth_of_its_own_to_be_tried_beside_depth_by_light(tree):
+    film = tree.root / "config" / "film.mp4"
+    film.write_bytes(b"a film")
+    (tree.root / "config" / "clips.tsv").write_text("name\tpath\nfilm\tfilm.mp4\ndemo\tphantom\n")
+    scenes = {tuple(sorted(where)) for rule, *where in tree.plan("tables") if rule == "scene_again"}
+    assert {where for where in scenes if "near_light" in where} == {("0", "demo", "near_light")}
+
+
 def test_a_hundred_clips_are_planned(tree):
     rows = "".join(f"clip{i}\tphantom\t{100 + i}\n" for i in range(100))
     (tree.root / "config" / "clips.tsv").write_text("name\tpath\tfocal\n" + rows)

@@ -312,6 +312,12 @@ TERMS = ("main", "no_trajectory", "no_anisotropy", "no_both")
 AGAIN = [0, 1, 2]
 
 
+def with_depth(clip):
+    """Whether depth of its own may come with a clip: no film has any."""
+    path = PLAN.clips[clip].path
+    return path is None or path.is_dir()
+
+
 def receipt():
     """Digest of every stage's code, and the settings of every clip and variant that the tables show."""
     shown = {*TABLED, *TERMS, "near_light"}

@@ -102,7 +102,7 @@ rule tables:
             ),
             *expand(
                 "results/{clip}/near_light/scenes/{again}/metrics.json",
-                clip=PLAN.clips,
+                clip=[c for c in PLAN.clips if with_depth(c)],
                 again=AGAIN[:1],
             ),
         ],
