@@ -42,10 +42,11 @@ class Reconstruction(Settings):
     head_width: int = Field(48, ge=1)
     """Neurons in each of the head's two hidden layers [1]."""
 
-    trajectory: float = Field(2.0, ge=0)
+    trajectory: float = Field(0.1, ge=0)
     """Weight of the trajectory term, 0 switches it off [1]."""
     trajectory_form: str = Field("default", pattern="^(default|literal)$")
-    """'default' asks neighbours for equal motion, 'literal' is the paper's printed sum of dot products [-]."""
+    """'default' asks neighbours for equal motion since the first frame, 'literal' is the paper's printed sum of dot
+    products of motions since the previous one [-]."""
     neighbours: int = Field(5, ge=1)
     """Neighbours of each Gaussian in the trajectory term [1]."""
     correspondence: float = Field(0.3, ge=0)

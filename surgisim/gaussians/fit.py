@@ -32,8 +32,8 @@ WIDEST = 10.0
 SMALLEST_UNIT = 2.0
 """What r_m is counted in at least [median first radius]: a scene of few Gaussians still has to be closed."""
 TRAJECTORY_EVERY = 2
-"""Iterations from one to the next that counts the trajectory term, as many times over: it asks for the field at one
-moment more."""
+"""Iterations from one to the next that counts the trajectory term, as many times over: it looks at six times as many
+points as there are."""
 SMOOTHED_EVERY = 4
 """Iterations from one to the next that counts how rough the field is, as many times over."""
 WEIGHED_EVERY = 2
@@ -206,11 +206,15 @@ class Fit:
         depth = masked_l1(image.depth / self.middle, seen.z / self.middle * image.alpha, seen.trust)
         return color + settings.depth * depth
 
+    def keeps_together(self, phase: Phase, iteration: int) -> bool:
+        """Whether the trajectory term counts in this iteration."""
+        return phase.trajectory and self.settings.trajectory > 0 and iteration % TRAJECTORY_EVERY == 0
+
     def earlier(self, phase: Phase, times: Sequence[float], iteration: int) -> list[float]:
-        """The moment [s] from which the trajectory term measures, a frame before the last of `times` at which anything
-        moves, where it counts in this iteration. One of several frames does for all."""
-        due = phase.trajectory and self.settings.trajectory and iteration % TRAJECTORY_EVERY == 0
-        return [t - 1 / self.camera.fps for t in times if t > 0][-1:] if due else []
+        """The moment [s] from which the trajectory term as printed measures, a frame before the last of `times` at
+        which anything moves. One of several frames does for all."""
+        asked = self.settings.trajectory_form == "literal" and self.keeps_together(phase, iteration)
+        return [t - 1 / self.camera.fps for t in times if t > 0][-1:] if asked else []
 
     def priors(
         self,
@@ -235,13 +239,13 @@ class Fit:
             total = total + SMOOTHED_EVERY * smoothness
         if not times.any():
             return total
-        if len(before):
+        if self.keeps_together(phase, iteration):
             if self.groups is None:
                 points = self.adam.tensors["mean"].detach().cpu().numpy()
                 self.groups = torch.from_numpy(groups(points, settings.neighbours)).to(self.device)
-            step = (moved[np.flatnonzero(times)[-1]] - before[0]) / self.radius
-            literal = settings.trajectory_form == "literal"
-            total = total + TRAJECTORY_EVERY * settings.trajectory * trajectory(step, self.groups, literal=literal)
+            gone, literal = moved[np.flatnonzero(times)[-1]], settings.trajectory_form == "literal"
+            motion = (gone - before[0] if literal else gone) / self.radius
+            total = total + TRAJECTORY_EVERY * settings.trajectory * trajectory(motion, self.groups, literal=literal)
         if phase.moves_field and settings.correspondence:
             total = total + settings.correspondence * self.astray(moved, seen)
         if phase.moves_field and settings.midway and len(self.unseen) and iteration % MIDWAY_EVERY == 0:

@@ -69,17 +69,18 @@ def anisotropic(scale: torch.Tensor, *, unit: float, r_m: float = 1.0, r_ani: fl
     return (torch.relu(largest / unit - r_m) + torch.relu(largest / smallest - r_ani)).mean()
 
 
-def trajectory(step: torch.Tensor, groups: torch.Tensor, *, literal: bool = False) -> torch.Tensor:
+def trajectory(motion: torch.Tensor, groups: torch.Tensor, *, literal: bool = False) -> torch.Tensor:
     """Keeps neighbours on parallel paths.
 
         L_traj = mean_i mean_{j,k in N_i} |d_j - d_k|^2  =  mean_i 2/n sum_j |d_j - mean of d|^2
         literal:  mean_i mean_{j,k in N_i} d_j . d_k     =  mean_i |mean of d|^2
 
-    step: motion of each Gaussian since the previous frame, d [m], (G, 3). groups: N_i, (M, n). The paper, equation
-    trajloss, is `literal`: minimised, it asks each group to stand still on average, which neighbours moving in
-    opposite directions satisfy. The default is 0 when they move alike.
+    motion: of each Gaussian, d [any length], (G, 3). groups: N_i, (M, n). The paper, equation trajloss, is `literal`,
+    of the motion since the previous frame: minimised, it asks each group to stand still on average, which neighbours
+    moving in opposite directions satisfy. The default is 0 when they move alike, and is of the motion since the first
+    frame: what a long pull adds up to is what parts neighbours, not one frame's share of it.
     """
-    moves = step[groups]
+    moves = motion[groups]
     middle = moves.mean(1)
     if literal:
         return middle.square().sum(1).mean()

@@ -62,7 +62,7 @@ def clip():
         settings=Reconstruction(
             iterations=400,
             phases=(0.5, 0.7, 0.9),
-            trajectory=0.5,
+            trajectory=0.02,
             most_gaussians=900,
             knots=(6, 12),
             knots_in_depth=(2, 2),

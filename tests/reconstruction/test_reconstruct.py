@@ -7,6 +7,8 @@ import torch
 from surgisim.deformation.field import displace, load_field
 from surgisim.gaussians.densify import ATTRIBUTES
 from surgisim.gaussians.engine_gsplat import lacking
+from surgisim.gaussians.fit import TRAJECTORY_EVERY
+from surgisim.gaussians.losses import trajectory
 from surgisim.gaussians.reconstruct import reconstruct
 from surgisim.gaussians.schedule import PHASES
 from surgisim.problem import Problem
@@ -160,20 +162,30 @@ def test_a_phase_moves_what_it_says_and_nothing_else(fit, phase):
     assert moved - colours == moves
 
 
+@pytest.mark.parametrize("form", ["default", "literal"])
 @pytest.mark.parametrize("iteration", [0, 1, 2])
-def test_the_trajectory_term_acts_every_other_iteration_of_its_phases(clip, fit, iteration):
+def test_the_trajectory_term_acts_every_other_iteration_of_its_phases(clip, fit, iteration, form):
+    """On the motion since the first frame; as printed, on that since the frame before."""
     fit.step(PHASES[0], [5], 0)
-    calm = clip.settings.model_copy(update={"trajectory": 0.0})
+    asked = clip.settings.model_copy(update={"trajectory_form": form})
     for phase in PHASES:
         values = []
-        for settings in (clip.settings, calm):
+        for settings in (asked, asked.model_copy(update={"trajectory": 0.0})):
             fit.settings = settings
             field, mean = fit.current_field(), fit.adam.tensors["mean"]
             times = [fit.seen.frame[4] / clip.camera.fps]
-            carried, _, _, grow = field.at(mean, times + fit.earlier(phase, times, iteration))
+            before = fit.earlier(phase, times, iteration)
+            carried, _, _, grow = field.at(mean, times + before)
             radius = (fit.adam.tensors["scale"] + grow[:1]).exp()
             values.append(fit.priors(phase, field, radius, carried, fit.seen.of([4]), iteration).item())
-        assert (values[0] > values[1]) == (phase.trajectory and iteration != 1)
+            if settings is asked:
+                motion = carried[0] - field.at(mean, [times[0] - 1 / clip.camera.fps])[0][0] * (form == "literal")
+        if phase.trajectory and iteration != 1:
+            term = trajectory(motion / fit.radius, fit.groups, literal=form == "literal").item()
+            assert term > 0
+            assert values[0] - values[1] == pytest.approx(TRAJECTORY_EVERY * asked.trajectory * term, rel=1e-3)
+        else:
+            assert values[0] == values[1]
 
 
 def test_the_rest_scene_says_nothing_of_the_field(clip, fit):

@@ -59,6 +59,7 @@ rule scene_score:
         truth=truth,
     output:
         metrics="results/{clip}/{variant}/scenes/{again}/metrics.json",
+        picture="results/{clip}/{variant}/scenes/{again}/surface.png",
     log:
         "logs/{clip}/{variant}/scenes/{again}_score.log",
     benchmark:
@@ -82,7 +83,7 @@ rule scene_score:
         " --frames {input.frames} --camera {input.camera} --given {input.given} --masks {input.masks}"
         " --inpainted {input.inpainted} --depth {input.depth} --tracks {input.tracks}"
         " --scene {input.scene} --deformation {input.deformation} --rendered {input.rendered}"
-        " {params.truth} --benchmarks {params.benchmarks} --metrics {output.metrics}"
+        " {params.truth} --benchmarks {params.benchmarks} --metrics {output.metrics} --picture {output.picture}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
@@ -110,6 +111,12 @@ rule tables:
             str(clip.path or f"results/{name}/main/phantom/clip.mp4")
             for name, clip in PLAN.clips.items()
         ],
+        pictures=expand(
+            "results/{clip}/{variant}/scenes/{again}/surface.png",
+            clip=PLAN.clips,
+            variant=TERMS,
+            again=AGAIN[:1],
+        ),
     output:
         table="results/tables/tables.json",
         page="results/tables/tables.html",
@@ -131,5 +138,6 @@ rule tables:
     shell:
         'python "$SURGISIM/stages/tables.py"'
         " --metrics {input.metrics} --scenes {input.scenes} --recordings {input.recordings}"
+        " --pictures {input.pictures}"
         " --table {output.table} --page {output.page} --sheet {output.sheet} --text {output.text}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"

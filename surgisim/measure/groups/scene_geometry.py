@@ -3,6 +3,7 @@
 Colours alone do not say where tissue goes, and a scene may look right whose splats are anywhere.
 """
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -80,27 +81,57 @@ def _against(
 
 def _of_neighbours(run: Run | OfScene) -> dict[str, dict[str, Any]]:
     """How the surface's splats move beside each other."""
+    found = surface_moved(run)
+    if found is None:
+        return {}
+    of = f"opaque splats, {len(found.strain)} frames evenly through the clip"
+    apart = f"|ln| of the distance of {NEIGHBOURS} neighbours over that at rest, 95th percentile: {of}"
+    over = f"triangles between neighbours in the picture that are turned over, in the worst frame: {of}"
+    return {
+        "strain_95": number(np.percentile(found.strain, 95), "1", apart),
+        "folded": number(100 * found.turned.mean(), "%", over),
+    }
+
+
+@dataclass(frozen=True)
+class SurfaceMoved:
+    """The opaque splats of a scene, and where its field carries them."""
+
+    strain: np.ndarray
+    """|ln| of the distance of neighbours over that at rest, (T', N, K), in FRAMES frames [1]."""
+    worst: int
+    """The frame in which most triangles are turned over."""
+    pixel: np.ndarray
+    """Where splats are in that frame, (N, 2) [px]."""
+    corners: np.ndarray
+    """Triangles between neighbours in the picture at rest, (M, 3)."""
+    turned: np.ndarray
+    """Whether each triangle is turned over in that frame, (M,)."""
+    apart: np.ndarray
+    """Each splat's mean strain in that frame, (N,) [1]."""
+
+
+def surface_moved(run: Run | OfScene) -> SurfaceMoved | None:
+    """None where there are too few opaque splats to have neighbours."""
     scene, camera, field = run.scene, run.camera, load_field(run.deformation)
     rest = scene.mean[expit(scene.opacity) > OPAQUE].astype(float)
     if len(rest) <= NEIGHBOURS:
-        return {}
+        return None
     pairs = cKDTree(rest).query(rest, NEIGHBOURS + 1)[1][:, 1:]
     corners = Delaunay(camera.project(rest)).simplices
     # Slivers turn over by rounding alone.
     corners = corners[abs(_areas(camera.project(rest), corners)) > SLIVER]
     length, area = _lengths(rest, pairs), _areas(camera.project(rest), corners)
+    frames = np.unique(np.linspace(0, camera.frames - 1, FRAMES).round().astype(int))
     strain, folded = [], []
-    for t in np.unique(np.linspace(0, camera.frames - 1, FRAMES).round().astype(int)):
+    for t in frames:
         now = displace(rest, field, t / camera.fps)
         strain.append(abs(np.log(np.maximum(_lengths(now, pairs), TINY) / np.maximum(length, TINY))))
         folded.append((_areas(camera.project(now), corners) * area < 0).mean())
-    of = f"opaque splats, {len(strain)} frames evenly through the clip"
-    apart = f"|ln| of the distance of {NEIGHBOURS} neighbours over that at rest, 95th percentile: {of}"
-    over = f"triangles between neighbours in the picture that are turned over, in the worst frame: {of}"
-    return {
-        "strain_95": number(np.percentile(strain, 95), "1", apart),
-        "folded": number(100 * np.max(folded), "%", over),
-    }
+    k = int(np.argmax(folded))
+    pixel = camera.project(displace(rest, field, frames[k] / camera.fps))
+    turned = _areas(pixel, corners) * area < 0
+    return SurfaceMoved(np.array(strain), int(frames[k]), pixel, corners, turned, strain[k].mean(1))
 
 
 def _at_rest(run: Run | OfScene) -> dict[str, dict[str, Any]]:

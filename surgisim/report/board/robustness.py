@@ -1,15 +1,12 @@
 """Verdicts on perturbed recordings as a matrix: one HTML file, one picture, and lines for a terminal."""
 
-import io
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from surgisim.report.board.page import told
-from surgisim.report.charts.paper import sheet
+from surgisim.report.charts.paper import png, sheet
 from surgisim.report.page import template
 from surgisim.report.palette import INK, REPLAY, TOOL
 
@@ -59,14 +56,6 @@ def picture(found: Found, before: Found | None) -> bytes:
         for axes, (title, one) in zip(figure.subplots(len(shown), 1, squeeze=False)[:, 0], shown, strict=True):
             _matrix(axes, title if len(shown) > 1 else "", one)
         return png(figure)
-
-
-def png(figure: Figure, dpi: int = 150) -> bytes:
-    """The figure as PNG."""
-    stream = io.BytesIO()
-    figure.set_dpi(dpi)
-    FigureCanvasAgg(figure).print_png(stream)
-    return stream.getvalue()
 
 
 def words(found: Found, before: Found | None) -> str:

@@ -4,8 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from surgisim.report.board.robustness import png
-from surgisim.report.charts.paper import sheet
+from surgisim.report.charts.paper import png, sheet
 from surgisim.report.palette import MUTED, RECONSTRUCTION, REPLAY
 
 

@@ -3,17 +3,20 @@
 import csv
 import io
 import json
+from collections.abc import Iterable
 from typing import Any
 
 from surgisim.proof.tables import Cell, plain
 from surgisim.report.digits import shown
 from surgisim.report.page import template
+from surgisim.report.uri import data_uri
 
 
-def page(found: dict[str, Any]) -> bytes:
-    """UTF-8."""
-    receipt = json.dumps(found["receipt"], indent=1, sort_keys=True)
-    return template("tables.html.j2").render(**(found | {"receipt": receipt}), in_words=in_words).encode()
+def page(found: dict[str, Any], pictures: Iterable[bytes] = ()) -> bytes:
+    """UTF-8. pictures: PNG of scenes' surfaces, shown below the table of environments."""
+    told = found | {"receipt": json.dumps(found["receipt"], indent=1, sort_keys=True)}
+    told["pictures"] = [data_uri(picture, "image/png") for picture in pictures]
+    return template("tables.html.j2").render(**told, in_words=in_words).encode()
 
 
 def as_csv(found: dict[str, Any]) -> bytes:

@@ -56,6 +56,14 @@ def address(figure: Figure) -> str:
     return data_uri(stream.getvalue(), "image/svg+xml")
 
 
+def png(figure: Figure, dpi: int = 150) -> bytes:
+    """The figure as PNG; the same figure gives the same bytes."""
+    stream = io.BytesIO()
+    figure.set_dpi(dpi)
+    FigureCanvasAgg(figure).print_png(stream, metadata={"Software": None})
+    return stream.getvalue()
+
+
 def photograph(figure: Figure, dpi: int = 190) -> str:
     """The figure as JPEG: smaller than SVG where pictures fill it."""
     canvas = FigureCanvasAgg(figure)
