@@ -1,5 +1,6 @@
 """A scene's surface as its field moves it, and its splats at rest: what a simulation takes over."""
 
+import matplotlib
 import numpy as np
 from matplotlib.collections import EllipseCollection
 from scipy.spatial.transform import Rotation
@@ -14,8 +15,8 @@ from surgisim.report.palette import ERROR, REPLAY
 
 MOST_STRAIN = 0.6
 """Strain at the colours' upper end [1]."""
-FLAT = {"linewidth": 0, "antialiased": False}
-"""Triangles without edges."""
+TURNED = "#00ffff"
+"""What is turned over."""
 WINDOW = 0.3
 """Side of the part whose splats are drawn one by one [of the picture's]."""
 
@@ -32,25 +33,14 @@ def surface(run: OfScene, title: str = "") -> bytes:
         if moved is None:
             left.set_title(f"{title}: too few opaque splats to have neighbours")
             return png(figure)
+        # What is turned over last, on top of what it lies in.
+        order = np.argsort(moved.turned, kind="stable")
+        strain = np.ma.masked_where(moved.turned, moved.apart[moved.corners].mean(1))[order]
+        colors = matplotlib.colormaps[ERROR].with_extremes(bad=TURNED)
         shown = left.tripcolor(
-            *moved.pixel.T,
-            moved.corners[~moved.turned],
-            moved.apart,
-            cmap=ERROR,
-            vmin=0,
-            vmax=MOST_STRAIN,
-            **FLAT,
-        )
-        if moved.turned.any():
-            left.tripcolor(
-                *moved.pixel.T,
-                moved.corners[moved.turned],
-                np.ones(len(moved.pixel)),
-                cmap="cool_r",
-                vmin=0,
-                vmax=1,
-                **FLAT,
-            )
+            *moved.pixel.T, moved.corners[order], facecolors=strain, cmap=colors, vmin=0, vmax=MOST_STRAIN,
+            linewidth=0, antialiased=False,
+        )  # fmt: skip
         left.set(xlim=(-0.5, camera.width - 0.5), ylim=(camera.height - 0.5, -0.5))
         left.set_title(
             f"{title}, frame {moved.worst}: {moved.turned.mean():.1%} turned over (blue)\n"
