@@ -173,7 +173,7 @@ rule diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=placed(diagnosing),
+        settings=placed(diagnosing, "diagnosis"),
         work=work,
         code=code("diagnosis"),
     shell:

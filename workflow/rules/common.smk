@@ -126,18 +126,28 @@ def upstream(stage, name):
     )
 
 
-def settings(stage):
-    """Params function: the slice of the settings this stage may read, and nothing else."""
-    return placed(lambda w: PLAN.slices[stage, w.clip, w.variant])
+def settings(stage, name=None):
+    """Params function: the slice of the settings this stage may read, and nothing else. name: the rule's, where it
+    is not the stage's."""
+    return placed(lambda w: PLAN.slices[stage, w.clip, w.variant], name or stage)
 
 
-def placed(chosen):
-    """Params function: what `chosen` says, on the GPU where the profile gives the job one (`set-resources`)."""
+# How many GPUs the profile, or the command line, gives each job of a rule (`set-resources`).
+GIVEN = {
+    name: given["gpu"].value
+    for name, given in workflow.resource_settings.overwrite_resources.items()
+    if "gpu" in given
+}
 
-    def of(wildcards, resources):
+
+def placed(chosen, name):
+    """Params function: what `chosen` says, on the GPU where jobs of the rule are given one."""
+
+    # Not asked of the job: Snakemake forgets that settings changed where what tells them looks at resources.
+    def of(wildcards):
         said = chosen(wildcards)
         told = json.loads(said)
-        if not (resources.get("gpu", 0) and "device" in told):
+        if not (GIVEN.get(name) and "device" in told):
             return said
         return json.dumps(told | {"device": "cuda"}, sort_keys=True)
 

@@ -65,7 +65,7 @@ rule clip_diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=settings("diagnosis"),
+        settings=settings("diagnosis", "clip_diagnosis"),
         work=work,
         code=code("diagnosis"),
     shell:

@@ -51,7 +51,7 @@ rule known_diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=placed(diagnosing),
+        settings=placed(diagnosing, "known_diagnosis"),
         work=work,
         code=code("diagnosis"),
     shell:

@@ -109,7 +109,7 @@ rule perturbed_diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=placed(diagnosing_perturbed),
+        settings=placed(diagnosing_perturbed, "perturbed_diagnosis"),
         code=code("diagnosis"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'

@@ -88,7 +88,7 @@ rule drawn_diagnosis:
         gpu=0,
     params:
         recording=folder,
-        settings=placed(lambda w: with_changes(OF_NULLS)),
+        settings=placed(lambda w: with_changes(OF_NULLS), "drawn_diagnosis"),
         code=code("diagnosis"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'

@@ -33,7 +33,8 @@ rule scene_again:
                 json.loads(PLAN.slices["reconstruction", w.clip, w.variant])
                 | {"seed": int(w.again)},
                 sort_keys=True,
-            )
+            ),
+            "scene_again",
         ),
         code=code("reconstruction"),
     shell:
