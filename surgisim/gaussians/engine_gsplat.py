@@ -87,8 +87,7 @@ def draw_factors(
 
 @cache
 def lacking() -> str:
-    """What the engine misses on this machine, in words; empty when it can run. Looked for once, not for
-    each picture."""
+    """What the engine misses on this machine, in words; empty when it can run. Looked for once, not at each picture."""
     if not torch.cuda.is_available():
         return "a CUDA device"
     if importlib.util.find_spec("gsplat") is None:

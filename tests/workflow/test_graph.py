@@ -61,9 +61,14 @@ def test_the_papers_tables_ask_for_their_runs_and_for_scenes_with_several_seeds(
 def test_a_film_has_no_depth_of_its_own_to_be_tried_beside_depth_by_light(tree):
     film = tree.root / "config" / "film.mp4"
     film.write_bytes(b"a film")
-    (tree.root / "config" / "clips.tsv").write_text("name\tpath\nfilm\tfilm.mp4\ndemo\tphantom\n")
+    (tree.root / "config" / "packed.zip").write_bytes(b"frames, and depth perhaps")
+    rows = "film\tfilm.mp4\npacked\tpacked.zip\ndemo\tphantom\n"
+    (tree.root / "config" / "clips.tsv").write_text("name\tpath\n" + rows)
     scenes = {tuple(sorted(where)) for rule, *where in tree.plan("tables") if rule == "scene_again"}
-    assert {where for where in scenes if "near_light" in where} == {("0", "demo", "near_light")}
+    assert {where for where in scenes if "near_light" in where} == {
+        ("0", "demo", "near_light"),
+        ("0", "near_light", "packed"),
+    }
 
 
 def test_a_hundred_clips_are_planned(tree):

@@ -14,6 +14,7 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.config.invent import Invent, InventClip
 from surgisim.config.whole import PARENTS
 from surgisim.digest import digest
+from surgisim.perception.ingest.archive import is_film
 from surgisim.phantom.family import family, told_focal
 from surgisim.plan import plan
 from surgisim.problem import Problem
@@ -325,7 +326,7 @@ AGAIN = [0, 1, 2]
 def with_depth(clip):
     """Whether depth of its own may come with a clip: no film has any."""
     path = PLAN.clips[clip].path
-    return path is None or path.is_dir()
+    return path is None or not is_film(path)
 
 
 def receipt():

@@ -42,6 +42,11 @@ def natural(name: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
 
 
+def is_film(path: Path) -> bool:
+    """Whether a recording is one file of film, and no tree of files."""
+    return path.is_file() and path.suffix.lower() != ".zip"
+
+
 def tree(path: Path, *, max_unpacked: int) -> Tree:
     """The files of a folder (zips in it opened) or of one zip; hidden files are passed over."""
     if path.is_file():

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from surgisim.perception.ingest import picture, video
-from surgisim.perception.ingest.archive import Tree, tree
+from surgisim.perception.ingest.archive import Tree, is_film, tree
 from surgisim.problem import Problem
 
 ASSUMED_FPS = 25.0
@@ -39,7 +39,7 @@ def recognise(path: Path, *, max_pixels: int, max_unpacked: int, given_masks: st
     """The recording at `path`, or one sentence saying what was found instead."""
     if not path.exists():
         raise Problem(f"{path}: no such file or folder. Pass a video, an image folder or an EndoNeRF folder or zip.")
-    if path.is_file() and path.suffix.lower() != ".zip":
+    if is_film(path):
         if path.stat().st_size == 0:
             raise Problem(f"{path}: is empty. Copy the video again.")
         film = video.opened(path, max_pixels=max_pixels)

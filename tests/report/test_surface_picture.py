@@ -1,15 +1,15 @@
 """The picture of a scene's surface shows what its numbers say."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import cv2
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from report.made_up import invent
-from test_evaluation import run_of
 
 from surgisim.measure.groups import scene_geometry as geometry
+from surgisim.measure.run import Run
 from surgisim.report.charts import surface as chart
 
 BLUE = [int(chart.TURNED[i : i + 2], 16) for i in (1, 3, 5)]
@@ -17,7 +17,8 @@ BLUE = [int(chart.TURNED[i : i + 2], 16) for i in (1, 3, 5)]
 
 @pytest.fixture(scope="module")
 def run():
-    return run_of(invent((40, 48), 8, 0))
+    made = invent((40, 48), 8, 0)
+    return Run(**{f.name: made[f.name] for f in fields(Run) if f.name not in ("truth", "found")})
 
 
 def blue(run) -> float:
