@@ -23,6 +23,8 @@ from surgisim.problem import Problem
 
 OUTPUTS = (3, 1, 4, 3)
 """Numbers of dmu, do, dR, dS."""
+IN_TIME = "cubic B-spline"
+"""How planes are read between knots in time; stored, because others' numbers would mean another motion."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +132,7 @@ def save_field(field: Field, moments: np.ndarray, tint: np.ndarray, history: np.
         "sizes": field.layout.sizes.tolist(),
         "channels": field.layout.channels,
         "head": [list(w.shape) for w in field.head],
+        "in_time": IN_TIME,
     }
     return Deformation(
         planes=field.planes.detach().numpy().astype(np.float32),
@@ -146,6 +149,11 @@ def save_field(field: Field, moments: np.ndarray, tint: np.ndarray, history: np.
 def load_field(deformation: Deformation) -> Field:
     """The field a reconstruction stored. Raises Problem if its layout and numbers do not fit."""
     told = json.loads(deformation.layout)
+    if told.get("in_time") != IN_TIME:
+        raise Problem(
+            f"Deformation: its planes are read in time as '{told.get('in_time', 'straight lines')}', and '{IN_TIME}' is "
+            "wanted: it is of an older version. Run the reconstruction again."
+        )
     layout = Layout(np.asarray(told["sizes"], np.int64), int(told["channels"]))
     ends = np.cumsum([0] + [int(np.prod(shape)) for shape in told["head"]])
     if layout.count != len(deformation.planes) or ends[-1] != len(deformation.weights):

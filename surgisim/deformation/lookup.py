@@ -24,19 +24,40 @@ def _knot(u, n):
 
 
 @njit(cache=True)
+def shares(time, n):
+    """How much of each of n knots a cubic B-spline has at `time`, 0-1, (n,).
+
+    Beyond its ends it goes on along the line through the last two knots, so it begins at the first knot and ends at the
+    last one, without bending there (de Boor, A practical guide to splines, 1978).
+    """
+    k, w, _ = _knot(time, n)
+    found = np.zeros(n)
+    basis = (1 - w) ** 3 / 6, (4 - 6 * w**2 + 3 * w**3) / 6, (1 + 3 * w + 3 * w**2 - 3 * w**3) / 6, w**3 / 6
+    for tap in range(4):
+        knot, share = k - 1 + tap, basis[tap]
+        if knot < 0:
+            found[0] += 2 * share
+            found[1] -= share
+        elif knot >= n:
+            found[n - 1] += 2 * share
+            found[n - 2] -= share
+        else:
+            found[knot] += share
+    return found
+
+
+@njit(cache=True)
 def _rows(flat, time, sizes, offsets, channels, scale):
     """The three time planes at `time` and at 0, (2, 3, longest, C)."""
     longest = max(sizes[scale, 0], sizes[scale, 1], sizes[scale, 2])
-    rows = np.empty((2, 3, longest, channels), flat.dtype)
-    k, w, _ = _knot(time, sizes[scale, 3])
+    rows = np.zeros((2, 3, longest, channels), flat.dtype)
+    share = shares(time, sizes[scale, 3])
     for p in range(3):
         n, start = sizes[scale, p], offsets[scale, 3 + p]
-        for i in range(n):
-            for c in range(channels):
-                low = flat[start + (k * n + i) * channels + c]
-                high = flat[start + ((k + 1) * n + i) * channels + c]
-                rows[0, p, i, c] = low + (high - low) * w
-                rows[1, p, i, c] = flat[start + i * channels + c]
+        rows[1, p, :n] = flat[start : start + n * channels].reshape(n, channels)
+        for k in np.flatnonzero(share):
+            first = start + k * n * channels
+            rows[0, p, :n] += share[k] * flat[first : first + n * channels].reshape(n, channels)
     return rows
 
 
@@ -174,11 +195,11 @@ def _backward_block(flat, where, time, sizes, offsets, channels, slope, scale, f
             dv += m * (xy_j * xz * yz + xy * xz * yz_j)
             dw += m * (xy * xz_k * yz + xy * xz * yz_k)
         to_where[g, 0], to_where[g, 1], to_where[g, 2] = du * si, dv * sj, dw * sk
-    k, w, _ = _knot(time, sizes[scale, 3])
+    share = shares(time, sizes[scale, 3])
     for plane in range(3):
         n, start = sizes[scale, plane], offsets[scale, 3 + plane]
         for i in range(n):
             for c in range(first, last):
-                to_flat[start + (k * n + i) * channels + c] += to_rows[0, plane, i, c] * (1 - w)
-                to_flat[start + ((k + 1) * n + i) * channels + c] += to_rows[0, plane, i, c] * w
                 to_flat[start + i * channels + c] += to_rows[1, plane, i, c]
+                for k in np.flatnonzero(share):
+                    to_flat[start + (k * n + i) * channels + c] += to_rows[0, plane, i, c] * share[k]

@@ -1,7 +1,8 @@
 """Six feature planes at several scales, looked up at the Gaussians' rest positions.
 
-At every scale the three space planes (xy, xz, yz) and the three time planes (xt, yt, zt) are read by bilinear
-interpolation; the time planes' product is measured from frame 0:
+At every scale the three space planes (xy, xz, yz) and the three time planes (xt, yt, zt) are read between their knots,
+in straight lines along x, y and z and by cubic B-splines in time, because tissue has mass: between two frames its
+velocity does not jump. The time planes' product is measured from frame 0:
 
     f = a_xy a_xz a_yz (a_xt a_yt a_zt |_t - a_xt a_yt a_zt |_0)
 

@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from torch.nn.functional import grid_sample, pad
 
+from surgisim.deformation.lookup import shares
 from surgisim.deformation.planes import SPACE, Layout
 
 DOWN, ACROSS = [i for i, _ in SPACE], [j for _, j in SPACE]
@@ -121,12 +122,11 @@ class Sheets:
     def _rows_at(self, time: float) -> torch.Tensor:
         """How much of each row of knots a time plane's line at this time, 0-1, is made of, (L, H)."""
         if time not in self._rows:
-            shares = np.zeros((len(self.layout.sizes), self.size[0]))
-            for share, n in zip(shares, self.layout.sizes[:, 3], strict=True):
-                k = min(int(time * (n - 1)), n - 2)
-                share[k : k + 2] = k + 1 - time * (n - 1), time * (n - 1) - k
+            found = np.zeros((len(self.layout.sizes), self.size[0]))
+            for share, n in zip(found, self.layout.sizes[:, 3], strict=True):
+                share[:n] = shares(time, n)
             # Kept: bringing them there waits for all that a GPU still does, and a clip has few moments.
-            self._rows[time] = self._put(shares)
+            self._rows[time] = self._put(found)
         return self._rows[time]
 
     @cached_property

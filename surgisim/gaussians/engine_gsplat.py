@@ -27,7 +27,7 @@ def rasterise(
     scale: torch.Tensor,
     opacity: torch.Tensor,
     color: torch.Tensor,
-    probe: torch.Tensor,
+    probe: torch.Tensor | None,
     camera: Camera,
     background: tuple[float, ...],
     near: float,
@@ -50,9 +50,13 @@ def rasterise(
         return nothing[..., None] + mean.new_tensor(background), nothing, nothing, mean.new_zeros(mean.shape[:-1])
     attributes = mean, rotation, scale, opacity
     image, alpha, facts = _draw(*attributes, color, camera, background, near, "RGB+D")
-    if probe.requires_grad and facts["means2d"].requires_grad:
+    if probe is not None and probe.requires_grad and facts["means2d"].requires_grad:
         facts["means2d"].register_hook(lambda gradient: _add_gradient(probe, gradient.reshape(probe.shape)))
-    weight = _weight(*attributes, camera, near) if weigh else mean.new_zeros(mean.shape[:-1])
+    if weigh:
+        weight = _weight(*attributes, camera, near)
+    else:
+        # One zero for all, which is on the device already: making as many as there are Gaussians costs a launch.
+        weight = _constant((0.0,), mean.device).expand(mean.shape[:-1])
     return image[..., :3], image[..., 3], alpha, weight
 
 
@@ -124,7 +128,7 @@ def _draw(mean, rotation, scale, opacity, color, camera, background, near, mode)
         render_mode=mode,
     )
     # One camera, before height, width and channels.
-    return image.squeeze(-4), alpha.squeeze(-4)[..., 0], facts
+    return image[..., 0, :, :, :], alpha[..., 0, :, :, 0], facts
 
 
 def _views(camera: Camera, device: torch.device) -> tuple[torch.Tensor, torch.Tensor]:

@@ -71,8 +71,6 @@ def rasterise(
     attributes = {"mean": mean, "rotation": rotation, "scale": scale, "opacity": opacity, "color": color}
     _check(attributes, checked)
     back = (0.0, 0.0, 0.0) if background is None else tuple(float(b) for b in background)
-    if probe is None:
-        probe = mean.new_zeros((*mean.shape[:-1], 2))
     if engine == "numba":
         from surgisim.gaussians.engine_numba import rasterise as draw
     elif engine == "gsplat":
@@ -83,6 +81,8 @@ def rasterise(
         from surgisim.gaussians.twin import rasterise as draw
     else:
         raise Problem(f"rasterise: engine is '{engine}', and there are numba, gsplat and twin.")
+    if probe is None and engine != "gsplat":
+        probe = mean.new_zeros((*mean.shape[:-1], 2))
     tensors = mean, rotation, scale, opacity, color, probe
     if mean.ndim == 2 or engine == "gsplat":
         return Image(*draw(*tensors, camera, back, near))

@@ -2,7 +2,9 @@ import numba
 import numpy as np
 import pytest
 import torch
+from scipy.interpolate import BSpline
 
+from surgisim.deformation.lookup import shares
 from surgisim.deformation.planes import SPACE, Layout, features
 from surgisim.deformation.sheets import Sheets
 from surgisim.deformation.smoothness import roughness
@@ -17,16 +19,27 @@ def planes():
     return layout, torch.tensor(rng.uniform(0.5, 1.5, layout.count)), torch.tensor(rng.uniform(0.02, 0.98, (40, 3)))
 
 
+def spline(time, n):
+    """Shares of n knots at `time`, by scipy's B-spline over knots that go on straight beyond both ends."""
+    beyond = np.zeros((n + 2, n))
+    beyond[1:-1] = np.eye(n)
+    beyond[0], beyond[-1] = 2 * beyond[1] - beyond[2], 2 * beyond[-2] - beyond[-3]
+    return BSpline(np.arange(-3, n + 3), beyond, 3)(time * (n - 1))
+
+
 def twin(flat, where, time, layout):
-    """The same through torch's own bilinear lookup."""
+    """The same through torch's own bilinear lookup, and scipy's splines in time."""
     out = []
     for scale in range(len(layout.sizes)):
 
         def look(index, down, across, scale=scale):
             grid = torch.stack([across, down], 1)[None, None] * 2 - 1
-            image = layout.plane(flat, scale, index).permute(2, 0, 1)[None]
+            plane = layout.plane(flat, scale, index)
+            if index >= 3:
+                share = torch.tensor(spline(float(down[0]), len(plane)))
+                plane = torch.einsum("t,tnc->nc", share, plane)[None]
             kept = {"mode": "bilinear", "padding_mode": "border", "align_corners": True}
-            return torch.nn.functional.grid_sample(image, grid, **kept)[0, :, 0].T
+            return torch.nn.functional.grid_sample(plane.permute(2, 0, 1)[None], grid, **kept)[0, :, 0].T
 
         space = torch.stack([look(p, where[:, i], where[:, j]) for p, (i, j) in enumerate(SPACE)]).prod(0)
         now, rest = (
@@ -49,6 +62,15 @@ def test_features_and_their_slopes_agree_with_torch(planes, time):
         results.append((value.detach(), a.grad, b.grad))
     for mine, other in zip(*results, strict=True):
         torch.testing.assert_close(mine, other, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 9])
+def test_knots_in_time_are_read_smoothly_and_ends_and_straight_lines_as_they_are(n):
+    wanted = np.linspace(0, 1, 41)
+    found = np.stack([shares(time, n) for time in wanted])
+    np.testing.assert_allclose(found, [spline(time, n) for time in wanted], atol=1e-12)
+    np.testing.assert_array_equal(found[[0, -1]], np.eye(n)[[0, -1]])
+    np.testing.assert_allclose(found @ np.linspace(0, 1, n), wanted, atol=1e-12)
 
 
 def test_slopes_agree_with_differences(planes):

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from surgisim.artifacts.metrics import Metrics
 from surgisim.problem import Problem
@@ -103,6 +104,15 @@ def test_the_forms_say_the_same(found):
         assert "no difference that can be told" in form
     assert "nan" not in text.lower()
     assert all(math.isfinite(float(r["value"])) for r in rows)
+
+
+def test_pictures_are_photographs_inside_the_page(found):
+    noise = np.random.default_rng(0).integers(0, 255, (64, 64, 3), np.uint8)
+    drawn = io.BytesIO()
+    Image.fromarray(noise).save(drawn, "PNG")
+    html = page(found, [drawn.getvalue()] * 2).decode()
+    assert html.count('src="data:image/jpeg;base64,') == 2
+    assert "image/png" not in html
 
 
 def test_what_does_not_fit_is_refused():
