@@ -1,8 +1,8 @@
 # make demo              set up once, run the whole graph on the embedded clip, say where the report is
 # make demo VIDEO=clip.mp4 [OUT=folder]    the same on your own clip
 # make test, make lint   what CI runs
-# make config            rewrite config/config.yaml and config/schemas/ from the settings models
-# make lock              choose the newest fitting versions anew and write requirements.txt
+# make config            rewrite config/config.yaml and config/schemas/ from the settings models, envs/ from the lock
+# make lock              choose the newest fitting versions anew and write requirements.txt; then make config
 
 BIN := .venv/bin
 OUT ?= .
@@ -28,6 +28,7 @@ lint: setup
 
 config: setup
 	$(BIN)/python -m surgisim.config.whole config
+	$(BIN)/python -m surgisim.environments envs
 
 lock: setup
 	$(BIN)/python -m pip install -q uv

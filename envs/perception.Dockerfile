@@ -1,16 +1,12 @@
-# The pixels: ingest, masking, inpainting, depth, tracking. Build from the checkout: docker build -f envs/perception.Dockerfile .
+# The pixels: ingest to tracking. Written by `make config`. Build from the checkout: docker build -f envs/perception.Dockerfile .
+# The checkout itself is not in it: jobs have it bound, so an edit makes no image stale.
 ARG BASE=python:3.11-slim-bookworm
 FROM ${BASE}
-RUN pip install --no-cache-dir \
-    'av>=13' \
-    'numba>=0.61' \
-    'numpy>=2.0' \
-    'onnxruntime>=1.20' \
-    'opencv-python-headless>=4.10' \
-    'pillow>=10' \
-    'pydantic>=2.9' \
-    'pyyaml>=6' \
-    'scikit-image>=0.24' \
-    'scipy>=1.14' \
-    'torch>=2.11,<3' \
-    'transformers>=4.49'
+# TORCH may name a build, "torch==2.13.0 --index-url https://download.pytorch.org/whl/cpu"; EXTRA adds what a GPU serves,
+# gsplat==1.5.3.
+ARG TORCH=torch==2.13.0
+ARG EXTRA=
+COPY envs/perception.txt /tmp/
+RUN pip install --no-cache-dir --require-hashes --no-deps -r /tmp/perception.txt \
+ && pip install --no-cache-dir ${TORCH} ${EXTRA} \
+ && rm /tmp/perception.txt

@@ -1,13 +1,12 @@
-# The phantom, the fit and the simulation. Build from the checkout: docker build -f envs/physics.Dockerfile .
+# The phantom, the fit, the simulation and the diagnosis. Written by `make config`. Build from the checkout: docker build -f envs/physics.Dockerfile .
+# The checkout itself is not in it: jobs have it bound, so an edit makes no image stale.
 ARG BASE=python:3.11-slim-bookworm
 FROM ${BASE}
-RUN pip install --no-cache-dir \
-    'av>=13' \
-    'numba>=0.61' \
-    'numpy>=2.0' \
-    'opencv-python-headless>=4.10' \
-    'pydantic>=2.9' \
-    'pyyaml>=6' \
-    'scipy>=1.14' \
-    'torch>=2.11,<3' \
-    'warp-lang>=1.10'
+# TORCH may name a build, "torch==2.13.0 --index-url https://download.pytorch.org/whl/cpu"; EXTRA adds what a GPU serves,
+# gsplat==1.5.3.
+ARG TORCH=torch==2.13.0
+ARG EXTRA=
+COPY envs/physics.txt /tmp/
+RUN pip install --no-cache-dir --require-hashes --no-deps -r /tmp/physics.txt \
+ && pip install --no-cache-dir ${TORCH} ${EXTRA} \
+ && rm /tmp/physics.txt

@@ -1,15 +1,12 @@
-# Numbers and pages: evaluation, report, summary. Build from the checkout: docker build -f envs/report.Dockerfile .
+# Numbers and pages: evaluation, reports, tables and boards. Written by `make config`. Build from the checkout: docker build -f envs/report.Dockerfile .
+# The checkout itself is not in it: jobs have it bound, so an edit makes no image stale.
 ARG BASE=python:3.11-slim-bookworm
 FROM ${BASE}
-RUN pip install --no-cache-dir \
-    'av>=13' \
-    'jinja2>=3.1' \
-    'matplotlib>=3.9' \
-    'numpy>=2.0' \
-    'opencv-python-headless>=4.10' \
-    'pydantic>=2.9' \
-    'pyyaml>=6' \
-    'safetensors>=0.4' \
-    'scikit-image>=0.24' \
-    'scipy>=1.14' \
-    'torch>=2.11,<3'
+# TORCH may name a build, "torch==2.13.0 --index-url https://download.pytorch.org/whl/cpu"; EXTRA adds what a GPU serves,
+# gsplat==1.5.3.
+ARG TORCH=torch==2.13.0
+ARG EXTRA=
+COPY envs/report.txt /tmp/
+RUN pip install --no-cache-dir --require-hashes --no-deps -r /tmp/report.txt \
+ && pip install --no-cache-dir ${TORCH} ${EXTRA} \
+ && rm /tmp/report.txt

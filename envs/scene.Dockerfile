@@ -1,10 +1,12 @@
-# The moving scene and the body: reconstruction, thickening. Build from the checkout: docker build -f envs/scene.Dockerfile .
+# The moving scene and the body: reconstruction, thickening. Written by `make config`. Build from the checkout: docker build -f envs/scene.Dockerfile .
+# The checkout itself is not in it: jobs have it bound, so an edit makes no image stale.
 ARG BASE=python:3.11-slim-bookworm
 FROM ${BASE}
-RUN pip install --no-cache-dir \
-    'numba>=0.61' \
-    'numpy>=2.0' \
-    'pydantic>=2.9' \
-    'pyyaml>=6' \
-    'scipy>=1.14' \
-    'torch>=2.11,<3'
+# TORCH may name a build, "torch==2.13.0 --index-url https://download.pytorch.org/whl/cpu"; EXTRA adds what a GPU serves,
+# gsplat==1.5.3.
+ARG TORCH=torch==2.13.0
+ARG EXTRA=
+COPY envs/scene.txt /tmp/
+RUN pip install --no-cache-dir --require-hashes --no-deps -r /tmp/scene.txt \
+ && pip install --no-cache-dir ${TORCH} ${EXTRA} \
+ && rm /tmp/scene.txt

@@ -15,6 +15,7 @@ import yaml
 from pydantic import BaseModel, Field, create_model
 
 from surgisim.config.base import Settings
+from surgisim.config.containers import Containers
 
 PARENTS = MappingProxyType(
     {
@@ -44,6 +45,7 @@ class Choices(Settings):
 
     run: tuple[str, ...] = ("main",)
     """Variants to run, names in variants.yaml [list of names]."""
+    containers: Containers = Field(default_factory=Containers)
 
 
 def group(stage: str) -> type[Settings]:

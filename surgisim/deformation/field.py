@@ -150,9 +150,10 @@ def load_field(deformation: Deformation) -> Field:
     """The field a reconstruction stored. Raises Problem if its layout and numbers do not fit."""
     told = json.loads(deformation.layout)
     if told.get("in_time") != IN_TIME:
+        found = told.get("in_time", "straight lines")
         raise Problem(
-            f"Deformation: its planes are read in time as '{told.get('in_time', 'straight lines')}', and '{IN_TIME}' is "
-            "wanted: it is of an older version. Run the reconstruction again."
+            f"Deformation: its planes are read in time as '{found}', and as '{IN_TIME}' here: it is of an older version. "
+            "Run the reconstruction again."
         )
     layout = Layout(np.asarray(told["sizes"], np.int64), int(told["channels"]))
     ends = np.cumsum([0] + [int(np.prod(shape)) for shape in told["head"]])

@@ -52,11 +52,9 @@ def rasterise(
     image, alpha, facts = _draw(*attributes, color, camera, background, near, "RGB+D")
     if probe is not None and probe.requires_grad and facts["means2d"].requires_grad:
         facts["means2d"].register_hook(lambda gradient: _add_gradient(probe, gradient.reshape(probe.shape)))
-    if weigh:
-        weight = _weight(*attributes, camera, near)
-    else:
-        # One zero for all, which is on the device already: making as many as there are Gaussians costs a launch.
-        weight = _constant((0.0,), mean.device).expand(mean.shape[:-1])
+    # One zero for all, which is on the device already: making as many as there are Gaussians costs a launch.
+    none = _constant((0.0,), mean.device)
+    weight = _weight(*attributes, camera, near) if weigh else none.expand(mean.shape[:-1])
     return image[..., :3], image[..., 3], alpha, weight
 
 

@@ -66,17 +66,6 @@ def test_every_setting_says_what_it_is_and_ends_in_its_unit(stage):
         assert re.search(r"\[[^\]]+\]\.?$", field.description or ""), f"{stage}.{name}: {field.description}"
 
 
-def test_environments_ask_for_what_pyproject_allows():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    allowed = {*project["dependencies"], *project["optional-dependencies"]["learned"]}
-    for path in (ROOT / "envs").glob("*.yaml"):
-        wanted = yaml.safe_load(path.read_text())["dependencies"][-1]["pip"]
-        assert set(wanted) <= allowed, path.name
-        image = path.with_suffix(".Dockerfile").read_text()
-        assert "ARG BASE=python:3.11-slim-bookworm\nFROM ${BASE}\n" in image
-        assert re.findall(r"'([^']+)'", image) == wanted, path.name
-
-
 def test_the_lock_names_no_host_and_no_cuda():
     lock = (ROOT / "requirements.txt").read_text()
     assert "://" not in lock

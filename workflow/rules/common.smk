@@ -5,11 +5,13 @@ import json
 import sys
 from pathlib import Path
 
-ROOT = Path(workflow.basedir).parent
+# Of this file, and not of the workflow, which may be another one that uses this one as a module.
+ROOT = Path(workflow.current_basedir.get_path_or_uri(secret_free=False)).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from surgisim.clips import Clip, invented
 from surgisim.config.base import parse as checked
+from surgisim.config.containers import Containers
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.config.invent import Invent, InventClip
 from surgisim.config.whole import PARENTS
@@ -90,19 +92,6 @@ except Problem as problem:
 wildcard_constraints:
     clip="|".join(PLAN.clips),
     variant="|".join(PLAN.variants),
-
-
-# How many jobs may compute on GPUs at once, for lease.py.
-AT_ONCE = workflow.global_resources.get("gpu")
-
-# Snakemake passes a job's threads on as OMP_NUM_THREADS only (OpenCV would take all of a machine, beside frames that are
-# worked on side by side already); and a stage must run with this checkout's library.
-shell.prefix(
-    "set -euo pipefail; export NUMBA_NUM_THREADS=$OMP_NUM_THREADS OPENCV_FOR_THREADS_NUM=1"
-    " MPLBACKEND=Agg PYTHONHASHSEED=0 PYTHONFAULTHANDLER=1"
-    f" SURGISIM_GPU_JOBS={AT_ONCE.value if AT_ONCE else 0}"
-    f" SURGISIM='{ROOT}' PYTHONPATH='{ROOT}' PATH='{Path(sys.executable).parent}':$PATH; "
-)
 
 
 # The ten stages whose time and memory the tables show.
