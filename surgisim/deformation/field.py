@@ -152,7 +152,7 @@ def load_field(deformation: Deformation) -> Field:
     if told.get("in_time") != IN_TIME:
         found = told.get("in_time", "straight lines")
         raise Problem(
-            f"Deformation: its planes are read in time as '{found}', and as '{IN_TIME}' here: it is of an older version. "
+            f"Deformation: its planes are read in time as '{found}', and as '{IN_TIME}' here: it is of an older one. "
             "Run the reconstruction again."
         )
     layout = Layout(np.asarray(told["sizes"], np.int64), int(told["channels"]))
