@@ -31,9 +31,7 @@ def outside():
     files = [*(Path(text) for text in told if text.startswith("/"))]
     files += [Path(clip.path) for clip in PLAN.clips.values() if clip.path]
     files += [Path(p) for p in config.get("recordings", {}).values()]
-    return sorted(
-        {str(ROOT), *(str(f.absolute().parent) for f in files if f.exists())}
-    )
+    return sorted({str(ROOT), *(str(f.absolute().parent) for f in files if f.exists())})
 
 
 def _texts(told):
