@@ -1,7 +1,9 @@
 """What the user asked for, written down beside the results, run, and answered."""
 
-import difflib
+import importlib.util
 import re
+import sys
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,14 +16,14 @@ from rich.markup import escape
 from surgisim.artifacts.base import load
 from surgisim.artifacts.fit import Fit
 from surgisim.artifacts.verdict import read_verdict
-from surgisim.clips import EMBEDDED, merge_entry, value
+from surgisim.clips import EMBEDDED, SHORT, merge_entry, value
 from surgisim.config.base import parse
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.config.whole import PARENTS, Whole, rooted
 from surgisim.follow import follower
 from surgisim.launch import State, home, launch, why
 from surgisim.plan import Plan, merged, plan, read_variants
-from surgisim.problem import Problem
+from surgisim.problem import Problem, nearest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,9 +53,17 @@ def carry_out(order: Order) -> int:
     """Check, write results/run.yaml, run the graph; the exit code."""
     console = Console(highlight=False, soft_wrap=True)
     place, out = home(), order.out.resolve()
+    arguments = _arguments(order)
     choices = chosen(order.configs, order.settings)
     base = yaml.safe_load((place / "config" / "config.yaml").read_text())
     known = read_variants(order.book or place / "config" / "variants.yaml")
+    for variant in order.variants:
+        if variant not in (*known, "all"):
+            raise Problem(
+                f"--variant {variant}: there is no such variant; did you mean '{nearest(variant, known)}'? Known: "
+                f"{', '.join(known)}, and 'all'."
+            )
+    _writable(order.out)
     if order.variants:
         choices["run"] = list(known if "all" in order.variants else order.variants)
     if order.operation:
@@ -70,14 +80,14 @@ def carry_out(order: Order) -> int:
     written = out / "results" / "run.yaml"
     _write(written, yaml.safe_dump(choices | {"clips": str(table), "variants": str(variants)}))
     began = time.monotonic()
-    arguments = _arguments(order, written)
+    arguments = ["--configfile", str(written), *arguments]
     try:
         with follower(console, quiet=order.dry or order.debug) as show:
             code, state = launch(out, arguments, show=show, debug=order.debug)
     except KeyboardInterrupt:
         console.print("stopped; the same command goes on from what was finished")
         return 130
-    if order.dry:
+    if order.dry and not code:
         _announce(console, state)
         return code
     return _answer(console, todo, out, code, state, order, time.monotonic() - began)
@@ -107,8 +117,10 @@ def chosen(configs: tuple[Path, ...], settings: tuple[str, ...]) -> dict[str, An
         if not equals:
             raise Problem(f"--set {entry}: STAGE.KEY=VALUE is wanted, for example ingest.size=160.")
         one: dict[str, Any] = {}
-        merge_entry(one, key.strip(), text, Path.cwd(), f"--set {entry}")
-        parse(Whole, one, f"--set {entry}")
+        # As they are given by options of their own, too.
+        where = f"--{key.strip()} {text}" if key.strip() in SHORT else f"--set {entry}"
+        merge_entry(one, key.strip(), text, Path.cwd(), where)
+        parse(Whole, one, where)
         total = merged(total, rooted(one, Path.cwd()))
     return total
 
@@ -135,22 +147,48 @@ def _write(path: Path, text: str) -> None:
         path.write_text(text)
 
 
-def _arguments(order: Order, written: Path) -> list[str]:
-    arguments = ["--configfile", str(written), "--cores", order.cores]
+def _writable(out: Path) -> None:
+    try:
+        (out / "results").mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out / "results"):
+            pass
+    except OSError as error:
+        why = (error.strerror or str(error)).lower()
+        raise Problem(f"--out {out}: nothing can be written there ({why}). Choose another folder.") from error
+
+
+def _arguments(order: Order) -> list[str]:
+    arguments = ["--cores", order.cores]
     if order.profile:
         named = home() / "workflow" / "profiles" / order.profile
         folder = named if named.is_dir() else Path(order.profile).resolve()
         if not folder.is_dir():
             raise Problem(f"--profile {order.profile}: no such folder; known by name: {_profiles()}.")
+        _executor(order.profile, folder)
         arguments += ["--profile", str(folder)]
     if order.until:
         stages = [*PARENTS, "summary"]
         if order.until not in stages:
-            near = difflib.get_close_matches(order.until, stages, 1, 0.0)[0]
-            raise Problem(f"--until {order.until}: there is no such stage; did you mean '{near}'? Known: {stages}.")
+            raise Problem(
+                f"--until {order.until}: there is no such stage; did you mean '{nearest(order.until, stages)}'? Known: "
+                f"{', '.join(stages)}."
+            )
         arguments += ["--until", order.until]
     arguments += ["--dry-run"] if order.dry else []
     return [*arguments, "--", "all", "clip_diagnoses"] if order.diagnose else arguments
+
+
+def _executor(name: str, folder: Path) -> None:
+    """Whether what the profile hands its jobs to is there."""
+    told = next((folder / f for f in ("config.yaml", "config.v8+.yaml", "config.yml") if (folder / f).is_file()), None)
+    wanted = (yaml.safe_load(told.read_text()) or {}).get("executor") if told else None
+    if wanted and wanted not in ("local", "dryrun", "touch"):
+        package = f"snakemake-executor-plugin-{wanted}"
+        if importlib.util.find_spec(package.replace("-", "_")) is None:
+            raise Problem(
+                f"--profile {name}: hands its jobs to '{wanted}', and the package {package} is not installed beside this "
+                f"program. Add it: {sys.executable} -m pip install {package}."
+            )
 
 
 def _profiles() -> str:

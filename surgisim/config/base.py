@@ -1,11 +1,11 @@
 """What every group of settings shares."""
 
-import difflib
+from collections.abc import Iterator
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from surgisim.problem import Problem
+from surgisim.problem import Problem, nearest
 
 S = TypeVar("S", bound="Settings")
 
@@ -24,12 +24,15 @@ def parse(kind: type[S], raw: dict[str, Any], where: str) -> S:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         if first["type"] == "extra_forbidden":
-            known = _fields(kind, first["loc"][:-1])
-            near = difflib.get_close_matches(str(first["loc"][-1]), known, 1, 0.0)
+            known, last = _fields(kind, first["loc"][:-1]), str(first["loc"][-1])
+            # One that only lacks the name of its group is a key of several, perhaps.
+            inside = [k for k in _paths(kind) if k.endswith(f".{last}")] if len(first["loc"]) == 1 else []
+            near = "' or '".join(inside) or nearest(last, known)
             raise Problem(
-                f"{where}: there is no key '{key}'; did you mean '{near[0]}'? Known here: {', '.join(sorted(known))}."
+                f"{where}: there is no key '{key}'; did you mean '{near}'? Known here: {', '.join(sorted(known))}."
             ) from error
-        raise Problem(f"{where}: key '{key}' is {first.get('input')!r}: {first['msg']}.") from error
+        words = first["msg"].removeprefix("Value error, ")
+        raise Problem(f"{where}: key '{key}' is {first.get('input')!r}: {words}.") from error
 
 
 def _fields(kind: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
@@ -41,6 +44,14 @@ def _fields(kind: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
         tagged = [k for k in here if any(part in get_args(f.annotation) for f in k.model_fields.values())]
         here = tagged or [m for k in here if part in k.model_fields for m in _models(k.model_fields[part].annotation)]
     return [name for k in here for name in k.model_fields]
+
+
+def _paths(kind: type[BaseModel], before: str = "") -> Iterator[str]:
+    """Every key of groups within groups, as 'group.key'."""
+    for name, field in kind.model_fields.items():
+        yield before + name
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            yield from _paths(field.annotation, f"{before}{name}.")
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:

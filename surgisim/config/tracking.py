@@ -1,9 +1,9 @@
 """How tissue points are followed, and what the instrument holds."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from surgisim.config.base import Settings
 
@@ -19,6 +19,12 @@ class Grasp(Settings):
     """When it is taken hold of [s]."""
     end: Annotated[float, Field(gt=0)] | None = None
     """When it is let go; none is the end of the recording [s]."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.end is not None and self.end <= self.start:
+            raise ValueError(f"it is let go at {self.end:g} s and taken hold of at {self.start:g} s; END must be later")
+        return self
 
 
 class Tracking(Settings):

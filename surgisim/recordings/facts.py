@@ -16,6 +16,14 @@ EXPECTED = ("E", "eta / E")
 
 
 def read_json(path: Path) -> dict[str, Any]:
+    folder = path.parent
+    if folder.is_file():
+        raise Problem(
+            f"{folder}: is a file, and a recording folder is wanted (docs/diagnosis.md). To diagnose what a film shows: "
+            f"surgisim run {folder} --diagnose."
+        )
+    if not folder.is_dir():
+        raise Problem(f"{folder}: no such folder, but a recording (docs/diagnosis.md) is to be read from there.")
     if not path.is_file():
         raise Problem(f"{path}: no such file, but every recording has one. Add it.")
     try:

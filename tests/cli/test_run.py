@@ -54,7 +54,12 @@ def test_a_missing_recording_is_one_sentence(tree):
         (["--set", "ingest.size"], "STAGE.KEY=VALUE is wanted"),
         (["--set", "ingest.size=wide"], "key 'ingest.size' is 'wide'"),
         (["--set", "diagnosis.fre=0"], "there is no key 'diagnosis.fre'; did you mean 'free'?"),
-        (["--variant", "elastc"], "elastc"),
+        (["--set", "iterations=3"], "did you mean 'reconstruction.iterations' or 'estimation.iterations'?"),
+        (["--set", "recon.iterations=3"], "did you mean 'reconstruction'?"),
+        (["--set", "grasp=10,20"], "--grasp 10,20: grasp is [10, 20]; X,Y,RADIUS is wanted"),
+        (["--set", "grasp=10,20,5,3,1"], "it is let go at 1 s and taken hold of at 3 s; END must be later"),
+        (["--variant", "elastc"], "--variant elastc: there is no such variant; did you mean 'elastic'?"),
+        (["--until", "recon"], "did you mean 'reconstruction'"),
         (["--until", "maskin"], "did you mean 'masking'"),
         (["--profile", "cloud"], "known by name: default, gpu, slurm"),
         (["--config", "none.yaml"], "none.yaml: no such file"),
@@ -65,6 +70,32 @@ def test_a_wrong_option_is_one_sentence_and_leaves_no_result(tree, options, want
     assert done.returncode == 2
     assert wanted in sentence(done)
     assert not list(tree.root.glob("there/results/demo/*"))
+
+
+def test_where_nothing_can_be_written_is_one_sentence(tree):
+    (tree.root / "film.mp4").touch()
+    done = tree.surgisim("demo", "--out", "film.mp4")
+    assert done.returncode == 2
+    assert "--out film.mp4: nothing can be written there" in sentence(done)
+
+
+def test_a_cluster_whose_plugin_is_not_installed_is_one_sentence(tree):
+    (tree.root / "profile").mkdir()
+    (tree.root / "profile" / "config.yaml").write_text("executor: nowhere\njobs: 3\n")
+    for more in ([], ["-n"]):
+        done = tree.surgisim("demo", "--out", "there", "--profile", "profile", *more)
+        assert done.returncode == 2
+        assert "the package snakemake-executor-plugin-nowhere is not installed" in sentence(done)
+    assert not (tree.root / "there").exists()
+
+
+def test_what_is_no_recording_folder_is_one_sentence(tree):
+    (tree.root / "film.mp4").touch()
+    for name, wanted in (("film.mp4", "surgisim run film.mp4 --diagnose"), ("nowhere", "nowhere: no such folder")):
+        done = tree.surgisim("diagnose", name, "--out", "there")
+        assert done.returncode == 2
+        assert wanted in sentence(done)
+    assert not (tree.root / "there").exists()
 
 
 def test_what_a_stage_objects_to_reaches_the_user(tree):
