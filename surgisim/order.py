@@ -186,8 +186,8 @@ def _executor(name: str, folder: Path) -> None:
         package = f"snakemake-executor-plugin-{wanted}"
         if importlib.util.find_spec(package.replace("-", "_")) is None:
             raise Problem(
-                f"--profile {name}: hands its jobs to '{wanted}', and the package {package} is not installed beside this "
-                f"program. Add it: {sys.executable} -m pip install {package}."
+                f"--profile {name}: hands its jobs to '{wanted}', and the package {package} is not installed "
+                f"beside this program. Add it: {sys.executable} -m pip install {package}."
             )
 
 

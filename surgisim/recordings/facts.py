@@ -19,7 +19,7 @@ def read_json(path: Path) -> dict[str, Any]:
     folder = path.parent
     if folder.is_file():
         raise Problem(
-            f"{folder}: is a file, and a recording folder is wanted (docs/diagnosis.md). To diagnose what a film shows: "
+            f"{folder}: is a file, and a recording folder is wanted (docs/diagnosis.md). To diagnose a film: "
             f"surgisim run {folder} --diagnose."
         )
     if not folder.is_dir():
