@@ -25,6 +25,8 @@ FAMILIES = {
     "report": "Numbers and pages: evaluation, reports, tables and boards.",
 }
 """Family -> what it is for."""
+EVERY = "every"
+"""All of them at once: one environment, or one image, for whoever wants no four."""
 PYTHON = "3.11"
 """Version that conda's environments have; images have their base's."""
 THERE = {
@@ -44,6 +46,8 @@ RULE = re.compile(r"^rule \w+:\n((?:(?:[ ]{4}.*)?\n)*)", re.MULTILINE)
 
 def scripts(family: str, root: Path) -> list[Path]:
     """Files that jobs of the family run."""
+    if family == EVERY:
+        return sorted({path for each in FAMILIES for path in scripts(each, root)})
     found = set()
     for rules in sorted((root / "workflow" / "rules").glob("*.smk")):
         for body in RULE.findall(rules.read_text()):
@@ -85,14 +89,14 @@ def for_conda(family: str, root: Path) -> str:
         for entry in lock(root)[name]
         if _holds(entry)
     ]
-    lines = [f"# {FAMILIES[family]} Written by `make config` from the lock.", "channels:", "  - conda-forge"]
+    lines = [f"# {_purpose(family)} Written by `make config` from the lock.", "channels:", "  - conda-forge"]
     lines += ["  - nodefaults", "dependencies:", f"  - python={PYTHON}", "  - pip", "  - pip:"]
     return "\n".join([*lines, *(f"      - {pin}" for pin in pins)]) + "\n"
 
 
 def for_images(family: str, root: Path) -> str:
     """Content of envs/FAMILY.txt: entries of the lock as they are, but torch, whose build each image chooses."""
-    head = f"# {FAMILIES[family]} Written by `make config` from the lock; torch comes on top.\n"
+    head = f"# {_purpose(family)} Written by `make config` from the lock; torch comes on top.\n"
     return head + "".join(f"{e}\n" for n in needed(family, root) if n != "torch" for e in lock(root)[n])
 
 
@@ -100,7 +104,7 @@ def image(family: str, root: Path) -> str:
     """Content of envs/FAMILY.Dockerfile."""
     (torch,) = lock(root)["torch"]
     return f"""\
-# {FAMILIES[family]} Written by `make config`. Build from the checkout: docker build -f envs/{family}.Dockerfile .
+# {_purpose(family)} Written by `make config`. Build from the checkout: docker build -f envs/{family}.Dockerfile .
 # The checkout itself is not in it: jobs have it bound, so an edit makes no image stale.
 ARG BASE=python:{PYTHON}-slim-bookworm
 FROM ${{BASE}}
@@ -155,10 +159,14 @@ def main(folder: Path) -> None:
         (folder / name).write_text(content)
 
 
+def _purpose(family: str) -> str:
+    return FAMILIES.get(family, "All stages.")
+
+
 def written(root: Path) -> dict[str, str]:
     """File in envs/ -> its content."""
     forms = {".yaml": for_conda, ".txt": for_images, ".Dockerfile": image}
-    return {f"{family}{suffix}": form(family, root) for family in FAMILIES for suffix, form in forms.items()}
+    return {f"{family}{suffix}": form(family, root) for family in (*FAMILIES, EVERY) for suffix, form in forms.items()}
 
 
 if __name__ == "__main__":

@@ -1,0 +1,12 @@
+# All stages. Written by `make config`. Build from the checkout: docker build -f envs/every.Dockerfile .
+# The checkout itself is not in it: jobs have it bound, so an edit makes no image stale.
+ARG BASE=python:3.11-slim-bookworm
+FROM ${BASE}
+# TORCH may name a build, "torch==2.13.0 --index-url https://download.pytorch.org/whl/cpu"; EXTRA adds what a GPU serves,
+# gsplat==1.5.3.
+ARG TORCH=torch==2.13.0
+ARG EXTRA=
+COPY envs/every.txt /tmp/
+RUN pip install --no-cache-dir --require-hashes --no-deps -r /tmp/every.txt \
+ && pip install --no-cache-dir ${TORCH} ${EXTRA} \
+ && rm /tmp/every.txt
