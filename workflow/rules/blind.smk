@@ -34,7 +34,7 @@ rule invent:
     conda:
         "../../envs/physics.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         settings=inventing,
         code=code("invent"),
@@ -62,7 +62,7 @@ rule invent_clip:
     conda:
         "../../envs/physics.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         settings=inventing,
         code=code("invent_clip"),
@@ -85,7 +85,7 @@ rule seals:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=500,
+        mem_mb=growing(500),
     params:
         code=code("seals"),
     shell:
@@ -111,7 +111,7 @@ rule shuffle:
     conda:
         "../../envs/physics.yaml"
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
     params:
         own=folder,
         other=lambda w, input: Path(input.other[0]).parent,
@@ -139,7 +139,7 @@ rule shorten:
     conda:
         "../../envs/physics.yaml"
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
     params:
         recording=folder,
         settings=lambda w: json.dumps({"end": SHORTER[w.shorter]}),
@@ -169,7 +169,7 @@ rule diagnosis:
         "../../envs/physics.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=growing(4000),
         gpu=0,
     params:
         recording=folder,
@@ -199,7 +199,7 @@ rule diagnosis_report:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         recording=folder,
         code=code("diagnosis_report"),
@@ -230,7 +230,7 @@ rule score:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
     params:
         recording=folder,
         camera=lambda w, input: f"--camera {input.camera}" if input.camera else "",
@@ -264,7 +264,7 @@ rule scoreboard:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         recording=lambda w, input: [Path(path).parent for path in input.recording],
         settings=lambda w: json.dumps(
@@ -301,7 +301,7 @@ rule pooled:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
     params:
         settings=lambda w: json.dumps(
             {"pages": f"../{room('{seed}')}/{{case}}/main/diagnosis.html"}
@@ -338,7 +338,7 @@ rule ablations:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
     params:
         settings=lambda w: json.dumps({"ways": BESIDE[w.side]}),
         code=code("ablations"),

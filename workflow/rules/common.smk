@@ -122,6 +122,11 @@ def settings(stage, name=None):
     return placed(lambda w: PLAN.slices[stage, w.clip, w.variant], name or stage)
 
 
+def growing(amount):
+    """Resource function: this much at first, and as much again with each attempt that failed."""
+    return lambda wildcards, attempt: amount * attempt
+
+
 # How many GPUs the profile, or the command line, gives each job of a rule (`set-resources`).
 GIVEN = {
     name: given["gpu"].value

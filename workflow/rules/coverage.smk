@@ -23,7 +23,7 @@ rule interval_coverage:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         code=lambda w: _code("interval_coverage"),
     shell:

@@ -29,7 +29,7 @@ rule recorded:
     conda:
         "../../envs/physics.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         settings=lambda w: json.dumps({"name": f"{w.clip}.{w.variant}"}),
         code=code("recorded"),
@@ -61,7 +61,7 @@ rule clip_diagnosis:
         "../../envs/physics.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=growing(4000),
         gpu=0,
     params:
         recording=folder,
@@ -93,7 +93,7 @@ rule clip_diagnosis_report:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         recording=folder,
         code=code("diagnosis_report"),

@@ -13,7 +13,7 @@ rule phantom:
         "../../envs/physics.yaml"
     threads: 2
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         settings=settings("phantom"),
         code=code("phantom"),

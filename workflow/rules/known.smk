@@ -20,7 +20,7 @@ rule known:
     conda:
         "../../envs/physics.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         settings=lambda w: json.dumps({"case": w.known}),
         code=code("known"),
@@ -47,7 +47,7 @@ rule known_diagnosis:
         "../../envs/physics.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=growing(4000),
         gpu=0,
     params:
         recording=folder,
@@ -77,7 +77,7 @@ rule known_report:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         recording=folder,
         code=code("diagnosis_report"),
@@ -101,7 +101,7 @@ rule known_score:
     conda:
         "../../envs/physics.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         settings=lambda w: json.dumps({"case": w.known}),
         code=code("known_score"),
@@ -121,7 +121,7 @@ rule known_direct:
     conda:
         "../../envs/physics.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         settings=lambda w: json.dumps({"case": w.known}),
         code=code("known_direct"),
@@ -150,7 +150,7 @@ rule known_board:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
     params:
         code=code("known_board"),
     shell:

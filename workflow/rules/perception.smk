@@ -15,7 +15,7 @@ rule ingest:
     conda:
         "../../envs/perception.yaml"
     resources:
-        mem_mb=3000,
+        mem_mb=growing(3000),
     params:
         settings=settings("ingest"),
         code=code("ingest"),
@@ -40,7 +40,7 @@ rule masking:
         "../../envs/perception.yaml"
     threads: 4
     resources:
-        mem_mb=3000,
+        mem_mb=growing(3000),
         gpu=0,
     params:
         settings=settings("masking"),
@@ -65,7 +65,7 @@ rule inpainting:
         "../../envs/perception.yaml"
     threads: 4
     resources:
-        mem_mb=3000,
+        mem_mb=growing(3000),
         gpu=0,
     params:
         settings=settings("inpainting"),
@@ -90,7 +90,7 @@ rule correspondence:
         "../../envs/perception.yaml"
     threads: 4
     resources:
-        mem_mb=3000,
+        mem_mb=growing(3000),
     params:
         settings=settings("correspondence"),
         code=code("correspondence"),
@@ -118,7 +118,7 @@ rule depth:
         "../../envs/perception.yaml"
     threads: 4
     resources:
-        mem_mb=3000,
+        mem_mb=growing(3000),
         gpu=0,
     params:
         settings=settings("depth"),
@@ -148,7 +148,7 @@ rule tracking:
         "../../envs/perception.yaml"
     threads: 4
     resources:
-        mem_mb=3000,
+        mem_mb=growing(3000),
         gpu=0,
     params:
         settings=settings("tracking"),

@@ -25,7 +25,7 @@ rule estimation:
         "../../envs/physics.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=growing(4000),
         gpu=0,
     params:
         settings=settings("estimation"),
@@ -72,7 +72,7 @@ rule simulation:
         "../../envs/physics.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=growing(4000),
         gpu=0,
     params:
         settings=settings("simulation"),

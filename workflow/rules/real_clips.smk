@@ -23,7 +23,7 @@ rule clip_table:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         code=lambda w: _code("clip_table"),
     shell:

@@ -35,7 +35,7 @@ rule evaluation:
         "../../envs/report.yaml"
     threads: 4
     resources:
-        mem_mb=3000,
+        mem_mb=growing(3000),
     params:
         truth=lambda w, input: f"--truth {input.truth}" if input.truth else "",
         benchmarks=benchmarks,
@@ -88,7 +88,7 @@ rule report:
         "../../envs/report.yaml"
     threads: 4
     resources:
-        mem_mb=3000,
+        mem_mb=growing(3000),
     params:
         truth=lambda w, input: f"--truth {input.truth}" if input.truth else "",
         settings=settings("report"),
@@ -121,7 +121,7 @@ rule summary:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         code=lambda w: _code("summary"),
     shell:

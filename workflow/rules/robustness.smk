@@ -76,7 +76,7 @@ rule perturb:
     conda:
         "../../envs/physics.yaml"
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
     params:
         recording=folder,
         truth=lambda w, input: f"--truth-tracks {input.truth}" if input.truth else "",
@@ -105,7 +105,7 @@ rule perturbed_diagnosis:
         "../../envs/physics.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=growing(4000),
         gpu=0,
     params:
         recording=folder,
@@ -140,7 +140,7 @@ rule robustness:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
     params:
         folder=lambda w, output: Path(output.table).parent,
         before=earlier(f"robustness/{SEED}"),
@@ -176,7 +176,7 @@ rule metamorphic:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
     params:
         before=earlier("metamorphic"),
         settings=json.dumps({"names": list(ASKED), "perturbations": OF_RECORDINGS}),

@@ -21,7 +21,7 @@ rule reconstruction:
         "../../envs/scene.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=growing(4000),
         gpu=0,
     params:
         settings=settings("reconstruction"),
@@ -49,7 +49,7 @@ rule thickening:
     conda:
         "../../envs/scene.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         settings=settings("thickening"),
         code=code("thickening"),

@@ -22,7 +22,7 @@ rule draws:
         "../../envs/physics.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=growing(4000),
     params:
         recording=folder,
         settings=json.dumps(
@@ -56,7 +56,7 @@ rule draw:
     conda:
         "../../envs/physics.yaml"
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
     params:
         recording=folder,
         settings=lambda w: json.dumps({"number": int(w.number)}),
@@ -84,7 +84,7 @@ rule drawn_diagnosis:
         "../../envs/physics.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=growing(4000),
         gpu=0,
     params:
         recording=folder,
@@ -112,7 +112,7 @@ rule self_consistency:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
     params:
         code=code("self_consistency"),
     shell:

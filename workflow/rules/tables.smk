@@ -25,7 +25,7 @@ rule scene_again:
         "../../envs/scene.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=growing(4000),
         gpu=0,
     params:
         settings=placed(
@@ -69,7 +69,7 @@ rule scene_score:
         "../../envs/report.yaml"
     threads: 2
     resources:
-        mem_mb=3000,
+        mem_mb=growing(3000),
     params:
         truth=lambda w, input: f"--truth {input.truth}" if input.truth else "",
         benchmarks="benchmarks/{clip}/{variant}/scenes/{again}/reconstruction.tsv",
@@ -130,7 +130,7 @@ rule tables:
     conda:
         "../../envs/report.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         settings=lambda w: json.dumps(
             {"receipt": receipt(), "clips": list(PLAN.clips)}, sort_keys=True

@@ -20,7 +20,7 @@ rule verification_case:
         "../../envs/physics.yaml"
     threads: 2
     resources:
-        mem_mb=4000,
+        mem_mb=growing(4000),
     params:
         code=lambda w: digest(ROOT / f"surgisim/verification/{w.case}.py", ROOT),
     shell:
@@ -40,7 +40,7 @@ rule verification:
     conda:
         "../../envs/physics.yaml"
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
     params:
         code=lambda w: digest(ROOT / "surgisim/verification/page.py", ROOT),
     shell:
