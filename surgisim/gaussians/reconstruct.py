@@ -71,7 +71,7 @@ def reconstruct(
         stride=settings.gaussians_per_pixel**-0.5,
         most=max(int(settings.most_gaussians / settings.growth), 1),
     )
-    with threads(settings.threads):
+    with threads(settings.threads, same_bytes=settings.device == "cpu"):
         fit = Fit(start, seen, camera, len(frames.rgb), settings)
         history = fit.run(progress)
         scene, field, tint = fit.result()
@@ -81,9 +81,17 @@ def reconstruct(
 
 
 @contextmanager
-def threads(count: int) -> Iterator[None]:
-    """Let torch and the compiled loops use this many threads, as far as there are, and give back what was set."""
+def threads(count: int, *, same_bytes: bool) -> Iterator[None]:
+    """Let torch and the compiled loops use this many threads, as far as there are, and give back what was set.
+
+    same_bytes: whether torch may not add slopes in the order in which its threads come by, as it does where Gaussians
+    are read by their numbers.
+    """
     before = torch.get_num_threads(), numba.get_num_threads()
+    strict, filled = torch.are_deterministic_algorithms_enabled(), torch.utils.deterministic.fill_uninitialized_memory
+    torch.use_deterministic_algorithms(same_bytes or strict)
+    # It would also fill all memory that is asked for, which no sum of ours reads.
+    torch.utils.deterministic.fill_uninitialized_memory = filled and strict
     torch.set_num_threads(count)
     numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))
     try:
@@ -91,3 +99,5 @@ def threads(count: int) -> Iterator[None]:
     finally:
         torch.set_num_threads(before[0])
         numba.set_num_threads(before[1])
+        torch.use_deterministic_algorithms(strict)
+        torch.utils.deterministic.fill_uninitialized_memory = filled

@@ -7,6 +7,7 @@ import torch
 from surgisim.gaussians.adam import FIRST, SECOND, TINY, Adam
 from surgisim.gaussians.densify import ATTRIBUTES, Record, renew
 from surgisim.gaussians.observations import observe
+from surgisim.gaussians.reconstruct import threads
 from surgisim.gaussians.schedule import PHASES, phase_at, rate_at
 from surgisim.problem import Problem
 
@@ -132,3 +133,16 @@ def test_the_four_phases_are_those_of_the_paper():
         (False, True, True),
         (True, False, False),
     ]
+
+
+def test_two_threads_add_slopes_in_one_order():
+    make = torch.Generator().manual_seed(0)
+    many = torch.randint(0, 300, (400_000,), generator=make)
+    slope, found = torch.randn(400_000, 3, generator=make), set()
+    with threads(2, same_bytes=True):
+        for _ in range(6):
+            few = torch.ones(300, 3, requires_grad=True)
+            (few[many] * slope).sum().backward()
+            found.add(few.grad.numpy().tobytes())
+    assert len(found) == 1
+    assert not torch.are_deterministic_algorithms_enabled()
