@@ -71,7 +71,7 @@ def rooted(raw: dict[str, Any], folder: Path, kind: type[BaseModel] | None = Non
         wanted = field.annotation if field else None
         if isinstance(content, dict) and isinstance(wanted, type) and issubclass(wanted, BaseModel):
             result[key] = rooted(content, folder, wanted)
-        elif field and content and isinstance(content, str | Path) and is_path(field):
+        elif field and content and isinstance(content, str | Path) and is_path(field) and "://" not in str(content):
             result[key] = str((folder / content).absolute())
     return result
 

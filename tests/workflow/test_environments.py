@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from cheap_tree import ROOT
 
+from surgisim.config.whole import rooted
 from surgisim.digest import sources
 from surgisim.environments import FAMILIES, lock, needed, packages_distributions, scripts, third_parties, written
 
@@ -175,3 +176,8 @@ def test_another_workflow_uses_this_one_as_a_module(tree, tmp_path):
     assert said.returncode == 0, said.stderr[-2000:]
     assert (other / "out" / "done").exists()
     assert (other / "out" / "results" / "summary.html").exists()
+
+
+def test_an_image_lies_beside_the_config_that_names_it_and_an_address_is_left_alone():
+    told = {"containers": {"scene": "a.sif", "report": "docker://here/b:1"}}
+    assert rooted(told, Path("/mine")) == {"containers": {"scene": "/mine/a.sif", "report": "docker://here/b:1"}}
