@@ -6,6 +6,8 @@ FROM ${BASE}
 # gsplat==1.5.3.
 ARG TORCH=torch==2.13.0
 ARG EXTRA=
+# Threads of numba's loops; its own pool ends a process in which two of them meet.
+RUN apt-get update && apt-get install -y --no-install-recommends libgomp1 && rm -rf /var/lib/apt/lists/*
 COPY envs/physics.txt /tmp/
 RUN pip install --no-cache-dir --require-hashes --no-deps -r /tmp/physics.txt \
  && pip install --no-cache-dir ${TORCH} ${EXTRA} \

@@ -19,6 +19,7 @@ from surgisim.config.whole import Whole, is_path
 from surgisim.launch import home
 from surgisim.order import chosen
 from surgisim.problem import Problem
+from surgisim.side_by_side import together
 
 GIB = 2**30
 PACKAGES = ("surgisim", "snakemake", "numpy", "numba", "torch", "warp-lang", "opencv-python-headless", "av")
@@ -63,6 +64,8 @@ def _machine() -> Iterator[Row]:
     yield "memory", f"{total:.1f} GB, {free:.1f} GB free", means
     disk = shutil.disk_usage(Path.cwd()).free / GIB
     yield "disk here", f"{disk:.1f} GB free", "enough" if disk > 2 else "little: a clip's results take up to 1 GB"
+    lacking = "" if together() else "work is done one piece at a time: install libgomp1"
+    yield "OpenMP", "there" if not lacking else "none", lacking
     good = sys.version_info >= (3, 11)
     yield "python", f"{platform.python_version()} in {sys.prefix}", "" if good else "too old: 3.11 is wanted"
     try:

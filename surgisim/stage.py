@@ -24,6 +24,7 @@ from typing import Any
 from surgisim.artifacts.base import Artifact, encoded, load, save_bytes
 from surgisim.config.base import Settings, parse
 from surgisim.problem import Problem
+from surgisim.side_by_side import openmp
 
 SPINS = "3000"
 """Rounds for which an idle thread waits awake. A reconstruction of 600 iterations on two processors took 24.5 s with
@@ -106,6 +107,7 @@ def stage(
             # work itself; ones that sleep at once wake late. It has to be said before either is loaded.
             os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
             os.environ.setdefault("GOMP_SPINCOUNT", SPINS)
+            openmp()
             with plain_errors(arguments["debug"] or bool(os.environ.get("SURGISIM_DEBUG"))):
                 _run(work, script.stem, reads, writes, settings, arguments)
 

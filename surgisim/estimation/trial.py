@@ -23,7 +23,7 @@ from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.physics.catalogue import choose
 from surgisim.problem import Problem
-from surgisim.side_by_side import threads
+from surgisim.side_by_side import threads, together
 
 WORKERS, ABREAST = 2, 6
 """Simulations that a search runs at once on processors, and at most where a GPU steps them, most of which a body leaves
@@ -278,6 +278,9 @@ def at_once(work: Callable[[Any, int], Any], items: list[Any], workers: int = WO
                 return
             results[n] = work(item, worker)
 
+    if not together():
+        mine(0)
+        return results
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(mine, range(min(workers, len(items)))))
     return results

@@ -18,7 +18,7 @@ from surgisim.report.plots import plots
 from surgisim.report.scenery import body_views, material_views, scene_views, side_film
 from surgisim.report.story import Story
 from surgisim.report.tables import grids, lists
-from surgisim.side_by_side import in_order
+from surgisim.side_by_side import in_order, together
 
 
 def page(story: Story, *, progress=lambda *_: None) -> bytes:
@@ -27,6 +27,8 @@ def page(story: Story, *, progress=lambda *_: None) -> bytes:
     with ThreadPoolExecutor(1) as beside:
         progress(0, 5, "contact sheet")
         strips = beside.submit(films, story)
+        if not together():
+            strips.result()
         content = {"story": story, "cards": headline(story), "doubts": distrust(story), "rows": contact(story)}
         progress(1, 5, "scene and body")
         content["scene"] = scene_views(story.run.scene, story.run.camera, width)
