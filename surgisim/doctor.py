@@ -6,7 +6,7 @@ import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from surgisim.launch import home
 from surgisim.order import chosen
 from surgisim.problem import Problem
 from surgisim.side_by_side import together
+from surgisim.weights import KINDS, found
 
 GIB = 2**30
 PACKAGES = ("surgisim", "snakemake", "numpy", "numba", "torch", "warp-lang", "opencv-python-headless", "av")
@@ -38,8 +39,9 @@ def examine(configs: tuple[Path, ...]) -> None:
     """Print what was found; weights are looked for where `configs` say."""
     console = Console(highlight=False, soft_wrap=True)
     settings = parse(Whole, chosen(configs, ()), "config")
-    for name, found, means in (*_machine(), *_accelerators(), *_software(), *_weights(settings)):
-        console.print(f"[bold]{name:24s}[/] {escape(found)}{f'  ({escape(means)})' if means else ''}")
+    there = found(settings.weights) if settings.weights else {}
+    for name, what, means in (*_machine(), *_accelerators(), *_software(), *_weights(settings, there)):
+        console.print(f"[bold]{name:24s}[/] {escape(what)}{f'  ({escape(means)})' if means else ''}")
 
 
 def laws() -> None:
@@ -109,20 +111,35 @@ def _software() -> Iterator[Row]:
     yield "apptainer", container or "not installed", "" if container else "no --sdm apptainer; nothing else needs it"
 
 
-def _weights(settings: BaseModel, prefix: str = "") -> Iterator[Row]:
-    """Every setting that names a file."""
+def _weights(settings: BaseModel, there: Mapping[str, Path], prefix: str = "") -> Iterator[Row]:
+    """Every setting that names a file; there: what the folder of weights holds for it."""
     for name, field in type(settings).model_fields.items():
         value: Any = getattr(settings, name)
         if isinstance(value, BaseModel):
-            yield from _weights(value, f"{prefix}{name}.")
+            yield from _weights(value, there, f"{prefix}{name}.")
         elif is_path(field):
             key = f"{prefix}{name}"
-            if not value or str(value) == ".":
-                yield key, "not set", "left out, or done by the built-in method"
+            if not value and key in there:
+                yield key, str(there[key]), _with(key)
+            elif not value or str(value) == ".":
+                yield key, "not set", _without(key)
             elif Path(value).exists():
                 yield key, str(value), "found"
             else:
                 yield key, str(value), "no such file: a run that needs it will stop there"
+
+
+def _with(key: str) -> str:
+    kind = next(kind for kind in KINDS if kind.setting == key)
+    where = f"; asked for by {key.split('.')[0]}.backend: {kind.backend}" if kind.backend else ""
+    return f"brings {kind.brings}{where}"
+
+
+def _without(key: str) -> str:
+    if key.startswith("containers."):
+        return "no --sdm apptainer; nothing else needs it"
+    brings = next((kind.brings for kind in KINDS if kind.setting == key), None)
+    return f"without it: no {brings}" if brings else "left out, or done by the built-in method"
 
 
 def _cpu() -> str:

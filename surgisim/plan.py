@@ -14,6 +14,7 @@ from surgisim.clips import Clip, read_clips
 from surgisim.config.base import parse
 from surgisim.config.whole import NAME, ON_REQUEST, PARENTS, Choices, Whole, rooted
 from surgisim.problem import Problem
+from surgisim.weights import filled, found
 
 OWN = ("evaluation", "report")
 """Stages about one clip and one variant: never shared, even where the settings agree."""
@@ -53,11 +54,12 @@ def plan(config: Mapping[str, Any], *, clips: Path | Mapping[str, Clip], variant
     for variant, changes in overrides.items():
         parse(Whole, merged(config, changes), f"{variants}: variant '{variant}'")
     slices, homes, known = {}, {}, {}
+    there = found(choices.weights) if choices.weights else {}
     for name, clip in rows.items():
         own = merged(config, rooted(clip.overrides, table.resolve().parent))
         first: dict[tuple[str, str], str] = {}
         for variant, changes in overrides.items():
-            raw = merged(own, changes)
+            raw = filled(merged(own, changes), there)
             key = json.dumps(raw, sort_keys=True, default=str)
             if key not in known:
                 known[key] = _slices(parse(Whole, raw, f"{table}: clip '{name}'"))

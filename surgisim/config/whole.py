@@ -45,6 +45,8 @@ class Choices(Settings):
 
     run: tuple[str, ...] = ("main",)
     """Variants to run, names in variants.yaml [list of names]."""
+    weights: Path | None = None
+    """Folder of networks' weights, each found by its name (`surgisim doctor` lists them) [path]."""
     containers: Containers = Field(default_factory=Containers)
 
 
