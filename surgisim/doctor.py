@@ -139,7 +139,7 @@ def _without(key: str) -> str:
     if key.startswith("containers."):
         return "no --sdm apptainer; nothing else needs it"
     brings = next((kind.brings for kind in KINDS if kind.setting == key), None)
-    return f"without it: no {brings}" if brings else "left out, or done by the built-in method"
+    return f"would bring {brings}" if brings else "left out, or done by the built-in method"
 
 
 def _cpu() -> str:
