@@ -182,7 +182,7 @@ CONCEALED = {
     "scoreboard",
     "pooled",
 }
-CONCEALED |= {"robustness", "metamorphic", "perturb", "draws", "draw", "self_consistency"}
+CONCEALED |= {"study", "robustness", "metamorphic", "perturb", "draws", "draw", "self_consistency"}
 CONCEALED |= {
     "interval_coverage",
     "clip_table",

@@ -14,6 +14,7 @@ from surgisim.config.base import parse as checked
 from surgisim.config.containers import Containers
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.config.invent import Invent, InventClip
+from surgisim.config.study import PARTS as STUDIED
 from surgisim.config.whole import PARENTS
 from surgisim.digest import digest
 from surgisim.perception.ingest.archive import is_film
