@@ -2,7 +2,7 @@
 
 reads   body.npz, scene.ply, material.npz, physics.json, motion.npz, camera.json, frames.npz, masks.npz,
         a new operation (JSON)
-writes  replay.npz (every frame), video.mp4, final.ply (coloured points), yt.png (one column over time, recorded and replayed)
+writes  replay.npz (every frame), video.mp4, final.ply (coloured points), yt.png (one column over time)
 """
 
 from surgisim.artifacts.body import Body
@@ -43,7 +43,7 @@ def main(body, scene, material, physics, motion, camera, frames, masks, operatio
         settings = settings.model_copy(update={"operation": read_operation(operation)})
     moved = replay(body, scene, material, physics, motion, camera, settings, progress, recording=(frames, masks))
     shown = moved.rgb if len(moved.rgb) else frames.rgb[:1]
-    return moved, mp4(shown, camera.fps), final_ply(moved, body), yt_png(shown, frames.rgb, motion, camera)
+    return moved, mp4(shown, camera.fps), final_ply(moved, body), yt_png(shown, motion, camera)
 
 
 if __name__ == "__main__":

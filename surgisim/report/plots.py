@@ -98,7 +98,7 @@ def _slices(story: Story) -> str:
         pictures["replay"] = slice_yt(run.replay.rgb, column)
     changes = np.flatnonzero(story.phase[1:] != story.phase[:-1]) + 1
     ends = [float(story.time[t]) for t in changes]
-    return slices(pictures, run.camera.fps, ends)
+    return slices(pictures, run.camera.frames / run.camera.fps, ends)
 
 
 def _phase_of(story: Story, count: int) -> np.ndarray:
