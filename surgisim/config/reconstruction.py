@@ -39,6 +39,9 @@ class Reconstruction(Settings):
     """Knots along z, one number a scale [1]."""
     knots_in_time: tuple[float, ...] = (0.2, 0.6)
     """Knots along t, one number a scale [1/frame]."""
+    cubic_in_time: bool = False
+    """Whether knots along t are read by cubic B-splines, not in straight lines: better pictures between frames that are
+    used, and, from pictures alone, motion that is twice as far off [-]."""
     head_width: int = Field(48, ge=1)
     """Neurons in each of the head's two hidden layers [1]."""
 

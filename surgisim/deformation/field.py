@@ -23,8 +23,6 @@ from surgisim.problem import Problem
 
 OUTPUTS = (3, 1, 4, 3)
 """Numbers of dmu, do, dR, dS."""
-IN_TIME = "cubic B-spline"
-"""How planes are read between knots in time; stored, because others' numbers would mean another motion."""
 
 
 @dataclass(frozen=True)
@@ -109,14 +107,21 @@ class Field:
 
 
 def still_field(
-    low: np.ndarray, high: np.ndarray, sizes: np.ndarray, channels: int, width: int, rng: np.random.Generator
+    low: np.ndarray,
+    high: np.ndarray,
+    sizes: np.ndarray,
+    channels: int,
+    width: int,
+    rng: np.random.Generator,
+    *,
+    cubic: bool = False,
 ) -> Field:
     """A field that moves nothing yet: every plane is 1 and the head is random.
 
     low, high: the box (x, y, z [m], t [s]); sizes: knots along x, y, z, t at each scale, (L, 4); width: of the head's
     two hidden layers.
     """
-    layout = Layout(np.asarray(sizes, np.int64), channels)
+    layout = Layout(np.asarray(sizes, np.int64), channels, cubic)
     widths = [layout.features, width, width, sum(OUTPUTS)]
     head = tuple(
         torch.tensor(rng.standard_normal((n, m)) * np.sqrt(1.0 / m), dtype=torch.float32) for m, n in pairwise(widths)
@@ -132,7 +137,7 @@ def save_field(field: Field, moments: np.ndarray, tint: np.ndarray, history: np.
         "sizes": field.layout.sizes.tolist(),
         "channels": field.layout.channels,
         "head": [list(w.shape) for w in field.head],
-        "in_time": IN_TIME,
+        "cubic": field.layout.cubic,
     }
     return Deformation(
         planes=field.planes.detach().numpy().astype(np.float32),
@@ -149,13 +154,7 @@ def save_field(field: Field, moments: np.ndarray, tint: np.ndarray, history: np.
 def load_field(deformation: Deformation) -> Field:
     """The field a reconstruction stored. Raises Problem if its layout and numbers do not fit."""
     told = json.loads(deformation.layout)
-    if told.get("in_time") != IN_TIME:
-        found = told.get("in_time", "straight lines")
-        raise Problem(
-            f"Deformation: its planes are read in time as '{found}', and as '{IN_TIME}' here: it is of an older one. "
-            "Run the reconstruction again."
-        )
-    layout = Layout(np.asarray(told["sizes"], np.int64), int(told["channels"]))
+    layout = Layout(np.asarray(told["sizes"], np.int64), int(told["channels"]), bool(told.get("cubic", False)))
     ends = np.cumsum([0] + [int(np.prod(shape)) for shape in told["head"]])
     if layout.count != len(deformation.planes) or ends[-1] != len(deformation.weights):
         raise Problem(

@@ -24,14 +24,17 @@ def _knot(u, n):
 
 
 @njit(cache=True)
-def shares(time, n):
-    """How much of each of n knots a cubic B-spline has at `time`, 0-1, (n,).
+def shares(time, n, cubic):
+    """How much of each of n knots is read at `time`, 0-1, (n,): in straight lines between them, or by a cubic B-spline.
 
-    Beyond its ends it goes on along the line through the last two knots, so it begins at the first knot and ends at the
-    last one, without bending there (de Boor, A practical guide to splines, 1978).
+    Beyond its ends a spline goes on along the line through the last two knots, so it begins at the first knot and ends
+    at the last one, without bending there (de Boor, A practical guide to splines, 1978).
     """
     k, w, _ = _knot(time, n)
     found = np.zeros(n)
+    if not cubic:
+        found[k], found[k + 1] = 1 - w, w
+        return found
     basis = (1 - w) ** 3 / 6, (4 - 6 * w**2 + 3 * w**3) / 6, (1 + 3 * w + 3 * w**2 - 3 * w**3) / 6, w**3 / 6
     for tap in range(4):
         knot, share = k - 1 + tap, basis[tap]
@@ -47,11 +50,11 @@ def shares(time, n):
 
 
 @njit(cache=True)
-def _rows(flat, time, sizes, offsets, channels, scale):
+def _rows(flat, time, sizes, offsets, channels, scale, cubic):
     """The three time planes at `time` and at 0, (2, 3, longest, C)."""
     longest = max(sizes[scale, 0], sizes[scale, 1], sizes[scale, 2])
     rows = np.zeros((2, 3, longest, channels), flat.dtype)
-    share = shares(time, sizes[scale, 3])
+    share = shares(time, sizes[scale, 3], cubic)
     for p in range(3):
         n, start = sizes[scale, p], offsets[scale, 3 + p]
         rows[1, p, :n] = flat[start : start + n * channels].reshape(n, channels)
@@ -62,10 +65,10 @@ def _rows(flat, time, sizes, offsets, channels, scale):
 
 
 @njit(cache=True, parallel=True)
-def read(flat, where, time, sizes, offsets, channels, out):
+def read(flat, where, time, sizes, offsets, channels, cubic, out):
     """Features of all points into `out`, (G, L C); see `planes.features`."""
     for scale in range(len(sizes)):
-        rows = _rows(flat, time, sizes, offsets, channels, scale)
+        rows = _rows(flat, time, sizes, offsets, channels, scale, cubic)
         n1, n2 = sizes[scale, 1], sizes[scale, 2]
         a, b, d = offsets[scale, 0], offsets[scale, 1], offsets[scale, 2]
         for g in prange(len(where)):
@@ -99,7 +102,7 @@ def read(flat, where, time, sizes, offsets, channels, out):
 
 
 @njit(cache=True, parallel=True)
-def give_back(flat, where, time, sizes, offsets, channels, slope, to_flat, to_where):
+def give_back(flat, where, time, sizes, offsets, channels, cubic, slope, to_flat, to_where):
     """Slopes of the features (G, L C), added to those of the planes and, one a task, of the points (tasks, G, 3)."""
     blocks = (channels + BLOCK - 1) // BLOCK
     for task in prange(len(sizes) * blocks):
@@ -111,6 +114,7 @@ def give_back(flat, where, time, sizes, offsets, channels, slope, to_flat, to_wh
             sizes,
             offsets,
             channels,
+            cubic,
             slope,
             scale,
             first,
@@ -130,8 +134,8 @@ def _spread(to_flat, p, across, down, w_across, w_down, value):
 
 
 @njit(cache=True)
-def _backward_block(flat, where, time, sizes, offsets, channels, slope, scale, first, last, to_flat, to_where):
-    rows = _rows(flat, time, sizes, offsets, channels, scale)
+def _backward_block(flat, where, time, sizes, offsets, channels, cubic, slope, scale, first, last, to_flat, to_where):
+    rows = _rows(flat, time, sizes, offsets, channels, scale, cubic)
     to_rows = np.zeros_like(rows)
     n0, n1, n2 = sizes[scale, 0], sizes[scale, 1], sizes[scale, 2]
     for g in range(len(where)):
@@ -195,7 +199,7 @@ def _backward_block(flat, where, time, sizes, offsets, channels, slope, scale, f
             dv += m * (xy_j * xz * yz + xy * xz * yz_j)
             dw += m * (xy * xz_k * yz + xy * xz * yz_k)
         to_where[g, 0], to_where[g, 1], to_where[g, 2] = du * si, dv * sj, dw * sk
-    share = shares(time, sizes[scale, 3])
+    share = shares(time, sizes[scale, 3], cubic)
     for plane in range(3):
         n, start = sizes[scale, plane], offsets[scale, 3 + plane]
         for i in range(n):

@@ -1,8 +1,8 @@
 """Six feature planes at several scales, looked up at the Gaussians' rest positions.
 
 At every scale the three space planes (xy, xz, yz) and the three time planes (xt, yt, zt) are read between their knots,
-in straight lines along x, y and z and by cubic B-splines in time, because tissue has mass: between two frames its
-velocity does not jump. The time planes' product is measured from frame 0:
+in straight lines along x, y and z, and in time in straight lines or by cubic B-splines. The time planes' product is
+measured from frame 0:
 
     f = a_xy a_xz a_yz (a_xt a_yt a_zt |_t - a_xt a_yt a_zt |_0)
 
@@ -32,6 +32,8 @@ class Layout:
     sizes: np.ndarray
     """Knots along x, y, z, t at every scale, (L, 4) int64."""
     channels: int
+    cubic: bool = False
+    """Whether a plane is read in time by cubic B-splines, not in straight lines between its knots."""
 
     @property
     def offsets(self) -> np.ndarray:
@@ -77,7 +79,14 @@ class _Features(torch.autograd.Function):
         ctx.time, ctx.layout = time, layout
         out = np.empty((len(where), layout.features), where.detach().numpy().dtype)
         lookup.read(
-            flat.detach().numpy(), where.detach().numpy(), time, layout.sizes, layout.offsets, layout.channels, out
+            flat.detach().numpy(),
+            where.detach().numpy(),
+            time,
+            layout.sizes,
+            layout.offsets,
+            layout.channels,
+            layout.cubic,
+            out,
         )
         return torch.from_numpy(out)
 
@@ -95,6 +104,7 @@ class _Features(torch.autograd.Function):
             layout.sizes,
             layout.offsets,
             layout.channels,
+            layout.cubic,
             np.ascontiguousarray(slope.numpy()),
             to_flat,
             to_where,

@@ -124,7 +124,7 @@ class Sheets:
         if time not in self._rows:
             found = np.zeros((len(self.layout.sizes), self.size[0]))
             for share, n in zip(found, self.layout.sizes[:, 3], strict=True):
-                share[:n] = shares(time, n)
+                share[:n] = shares(time, n, self.layout.cubic)
             # Kept: bringing them there waits for all that a GPU still does, and a clip has few moments.
             self._rows[time] = self._put(found)
         return self._rows[time]

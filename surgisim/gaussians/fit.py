@@ -338,4 +338,5 @@ def first_field(
     ]
     duration = max(length - 1, 1) / camera.fps
     corners = np.append(low, 0.0), np.append(high, duration)
-    return still_field(*corners, np.array(sizes), settings.channels, settings.head_width, rng)
+    width, cubic = settings.head_width, settings.cubic_in_time
+    return still_field(*corners, np.array(sizes), settings.channels, width, rng, cubic=cubic)

@@ -2,7 +2,7 @@ import numba
 import numpy as np
 import pytest
 import torch
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, interp1d
 
 from surgisim.deformation.lookup import shares
 from surgisim.deformation.planes import SPACE, Layout, features
@@ -12,15 +12,18 @@ from surgisim.deformation.smoothness import roughness
 SIZES = np.array([[4, 5, 3, 4], [7, 6, 4, 9]])
 
 
-@pytest.fixture
-def planes():
-    layout = Layout(SIZES, 10)
+@pytest.fixture(params=[False, True], ids=["straight", "cubic"])
+def planes(request):
+    layout = Layout(SIZES, 10, request.param)
     rng = np.random.default_rng(0)
     return layout, torch.tensor(rng.uniform(0.5, 1.5, layout.count)), torch.tensor(rng.uniform(0.02, 0.98, (40, 3)))
 
 
-def spline(time, n):
-    """Shares of n knots at `time`, by scipy's B-spline over knots that go on straight beyond both ends."""
+def spline(time, n, cubic):
+    """Shares of n knots at `time`, by scipy: in straight lines, or by its B-spline over knots that go on straight
+    beyond both ends."""
+    if not cubic:
+        return interp1d(np.arange(n), np.eye(n), axis=0)(time * (n - 1))
     beyond = np.zeros((n + 2, n))
     beyond[1:-1] = np.eye(n)
     beyond[0], beyond[-1] = 2 * beyond[1] - beyond[2], 2 * beyond[-2] - beyond[-3]
@@ -36,7 +39,7 @@ def twin(flat, where, time, layout):
             grid = torch.stack([across, down], 1)[None, None] * 2 - 1
             plane = layout.plane(flat, scale, index)
             if index >= 3:
-                share = torch.tensor(spline(float(down[0]), len(plane)))
+                share = torch.tensor(spline(float(down[0]), len(plane), layout.cubic))
                 plane = torch.einsum("t,tnc->nc", share, plane)[None]
             kept = {"mode": "bilinear", "padding_mode": "border", "align_corners": True}
             return torch.nn.functional.grid_sample(plane.permute(2, 0, 1)[None], grid, **kept)[0, :, 0].T
@@ -64,18 +67,19 @@ def test_features_and_their_slopes_agree_with_torch(planes, time):
         torch.testing.assert_close(mine, other, rtol=1e-10, atol=1e-12)
 
 
+@pytest.mark.parametrize("cubic", [False, True])
 @pytest.mark.parametrize("n", [2, 3, 4, 9])
-def test_knots_in_time_are_read_smoothly_and_ends_and_straight_lines_as_they_are(n):
+def test_knots_in_time_are_read_smoothly_and_ends_and_straight_lines_as_they_are(n, cubic):
     wanted = np.linspace(0, 1, 41)
-    found = np.stack([shares(time, n) for time in wanted])
-    np.testing.assert_allclose(found, [spline(time, n) for time in wanted], atol=1e-12)
+    found = np.stack([shares(time, n, cubic) for time in wanted])
+    np.testing.assert_allclose(found, [spline(time, n, cubic) for time in wanted], atol=1e-12)
     np.testing.assert_array_equal(found[[0, -1]], np.eye(n)[[0, -1]])
     np.testing.assert_allclose(found @ np.linspace(0, 1, n), wanted, atol=1e-12)
 
 
 def test_slopes_agree_with_differences(planes):
     layout, flat, where = planes
-    few = Layout(layout.sizes[:1], 2)
+    few = Layout(layout.sizes[:1], 2, layout.cubic)
     flat, where = flat[: few.count].clone().requires_grad_(), where[:4].clone().requires_grad_()
     assert torch.autograd.gradcheck(lambda a, b: features(a, b, 0.37, few), (flat, where))
 

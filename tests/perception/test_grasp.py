@@ -79,7 +79,8 @@ def test_a_given_grasp_is_taken_as_given(sheet):
     [
         ({"pixel": [500.0, 10.0], "radius": 5.0}, "outside the picture"),
         ({"pixel": [20.0, 4.0], "radius": 5.0}, "not on the tissue"),
-        ({"pixel": [60.0, 50.0], "radius": 5.0, "start": 0.5, "end": 0.2}, "lasts from"),
+        ({"pixel": [60.0, 50.0], "radius": 5.0, "start": 0.5, "end": 0.2}, "END must be later"),
+        ({"pixel": [60.0, 50.0], "radius": 5.0, "start": 5.0, "end": 6.0}, "lasts from"),
     ],
 )
 def test_a_grasp_that_cannot_be_is_refused_in_a_sentence(sheet, grasp, word):

@@ -41,7 +41,7 @@ def test_what_is_done_is_passed_over_and_what_cannot_be_done_is_said(tmp_path):
     assert done["state"] == "passed over"
     assert (done["law"], done["probability"], done["log_evidence"]) == ("fibre", 0.9, 40.0)
     assert failed["state"] == "failed"
-    assert "recording.json" in failed["words"]
+    assert "missing: no such folder" in failed["words"]
     assert "fibre (0.90), log evidence 40.0" in many.line(done, 1, 2)
 
 
