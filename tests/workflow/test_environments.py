@@ -181,3 +181,13 @@ def test_another_workflow_uses_this_one_as_a_module(tree, tmp_path):
 def test_an_image_lies_beside_the_config_that_names_it_and_an_address_is_left_alone():
     told = {"containers": {"scene": "a.sif", "report": "docker://here/b:1"}}
     assert rooted(told, Path("/mine")) == {"containers": {"scene": "/mine/a.sif", "report": "docker://here/b:1"}}
+
+
+def test_recordings_that_are_diagnosed_as_they_are_are_bound(tree, here, tmp_path):
+    put(here / "bin" / "apptainer", APPTAINER.format(python=sys.executable, here=here))
+    (tmp_path / "seen" / "one").mkdir(parents=True)
+    tree.choices = {"containers": images(tree, here), "recordings": [str(tmp_path / "seen" / "one")]}
+    assert tree.run("--sdm", "apptainer") == 0
+    assert all(
+        str(tmp_path / "seen") in line.split(" | ")[1].split() for line in (here / "used").read_text().splitlines()
+    )

@@ -25,12 +25,14 @@ def image(family):
 
 def outside():
     """Folders that jobs read beside the one they run in: this checkout, recordings, weights."""
-    told = {
-        value for told in PLAN.slices.values() for value in _texts(json.loads(told))
-    }
-    files = [*(Path(text) for text in told if text.startswith("/"))]
+    named = {t for each in PLAN.slices.values() for t in _texts(json.loads(each))}
+    files = [Path(text) for text in named if text.startswith("/")]
     files += [Path(clip.path) for clip in PLAN.clips.values() if clip.path]
-    files += [Path(p) for p in config.get("recordings", {}).values()]
+    # Recordings that are diagnosed as they are, and not made here (robustness.smk, self_consistency.smk).
+    files += [
+        *map(Path, config.get("recordings", [])),
+        Path(config.get("drawn_from", ROOT)),
+    ]
     return sorted({str(ROOT), *(str(f.absolute().parent) for f in files if f.exists())})
 
 
