@@ -26,7 +26,7 @@ class Kind:
 KINDS = (
     Kind("masking.encoder", "sam2*encoder*.onnx", "outlines of instruments with its decoder", "sam2"),
     Kind("masking.decoder", "sam2*decoder*.onnx", "outlines of instruments with its encoder", "sam2"),
-    Kind("inpainting.weights", "inpaint*.[po][tn]*", "what instruments hide, painted by a network", "network"),
+    Kind("inpainting.weights", "inpaint*", "what instruments hide, painted by a network", "network"),
     Kind("depth.weights", "depth_anything*", "depth of single frames by a network", "depth_anything"),
     Kind("tracking.weights", "cotracker*.pt", "tissue points through a clip followed by a network", "cotracker"),
     Kind("evaluation.lpips_weights", "lpips*.safetensors", "LPIPS beside PSNR and SSIM in reports and tables", None),

@@ -200,10 +200,11 @@ def _backward_block(flat, where, time, sizes, offsets, channels, cubic, slope, s
             dw += m * (xy * xz_k * yz + xy * xz * yz_k)
         to_where[g, 0], to_where[g, 1], to_where[g, 2] = du * si, dv * sj, dw * sk
     share = shares(time, sizes[scale, 3], cubic)
+    read_from = np.flatnonzero(share)
     for plane in range(3):
         n, start = sizes[scale, plane], offsets[scale, 3 + plane]
         for i in range(n):
             for c in range(first, last):
                 to_flat[start + i * channels + c] += to_rows[1, plane, i, c]
-                for k in np.flatnonzero(share):
+                for k in read_from:
                     to_flat[start + (k * n + i) * channels + c] += to_rows[0, plane, i, c] * share[k]
