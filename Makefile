@@ -32,7 +32,7 @@ config: setup
 
 lock: setup
 	$(BIN)/python -m pip install -q uv
-	$(BIN)/python -m uv pip compile pyproject.toml --universal --python-version 3.11 --extra develop --extra learned --extra slurm \
+	$(BIN)/python -m uv pip compile pyproject.toml --universal --python-version 3.11 --extra develop --extra learned --extra slurm --extra view \
 	  --generate-hashes --no-emit-index-url --no-emit-find-links --excludes envs/excluded.txt --no-emit-package torch \
 	  --custom-compile-command "make lock" --upgrade --output-file requirements.txt
 
