@@ -30,7 +30,7 @@ Diagnose = Annotated[bool, typer.Option("--diagnose", help="Also say what physic
 Debug = Annotated[bool, typer.Option(help="Show everything Snakemake says, and tracebacks.")]
 
 GRASP = "What the tool holds: middle and radius in the recording's first frame [px], from when to when [s]."
-CLICKS = "JSON list of points on tool or tissue: {frame, x, y, label}, at the working size [px]."
+CLICKS = "JSON list of points on tool or tissue: {frame, x, y, label}, in the recording's pixels [px]."
 
 
 @app.command()
@@ -143,6 +143,42 @@ def diagnose(
         files = (out / name for name in ("diagnosis.json", "mismatch.npz", "physics.json"))
         save_bytes({out / "diagnosis.html": page(read(recording, *files), progress=Progress("page"))})
         typer.echo(f"{out / 'diagnosis.html'} shows it.")
+
+
+Host = Annotated[str, typer.Option(help="Where the page is bound; beyond this machine only with a token.")]
+Port = Annotated[int, typer.Option(help="Port of the page; 0 takes a free one.")]
+Token = Annotated[
+    str | None, typer.Option(envvar="SURGISIM_TOKEN", help="What visitors must bring; 16 characters or more.")
+]
+
+
+@app.command()
+def view(
+    out: Annotated[Path, typer.Argument(help="Folder of a run: what was given to --out.")],
+    clip: Annotated[str | None, typer.Option(help="Which clip, where there are several.")] = None,
+    variant: Annotated[str | None, typer.Option(help="Which variant; main unless said.")] = None,
+    host: Host = "localhost",
+    port: Port = 8080,
+    token: Token = None,
+    device: Annotated[str, typer.Option(help="Where the body by hand is simulated: cpu or cuda.")] = "cpu",
+    debug: Debug = False,
+) -> None:
+    """Look at a run in a browser, and take hold of its tissue: pull, push, cut, let go."""
+    with plain_errors(debug):
+        from surgisim.viewer.gate import checked_token
+
+        checked_token(host, token)
+        from surgisim.viewer.app import Viewer
+        from surgisim.viewer.case import chosen, read
+
+        viewer = Viewer(read(out, *chosen(out, clip, variant)), out, host=host, port=port, token=token, device=device)
+        typer.echo(f"{viewer.address} shows it. Ctrl-C ends it.")
+        try:
+            viewer.serve()
+        except KeyboardInterrupt:
+            typer.echo("ended.")
+        finally:
+            viewer.close()
 
 
 @app.command()

@@ -40,6 +40,19 @@ class Camera(JsonArtifact):
         """Intrinsics [px], (3, 3)."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
 
+    @property
+    def _resized(self) -> np.ndarray:
+        """Working pixels a recorded one, along x and y."""
+        return np.array([self.width / self.crop[2], self.height / self.crop[3]])
+
+    def from_recording(self, pixels: np.ndarray) -> np.ndarray:
+        """Working pixels of the recording's own [px], (..., 2)."""
+        return (np.asarray(pixels, float) - self.crop[:2] + 0.5) * self._resized - 0.5
+
+    def to_recording(self, pixels: np.ndarray) -> np.ndarray:
+        """The recording's own pixels of working ones [px], (..., 2)."""
+        return (np.asarray(pixels, float) + 0.5) / self._resized - 0.5 + self.crop[:2]
+
     def project(self, points: np.ndarray) -> np.ndarray:
         """Pixels of points, camera frame [m], (..., 3) -> [px], (..., 2)."""
         return np.stack(

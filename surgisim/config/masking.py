@@ -12,11 +12,11 @@ class Click(Settings):
     """A point the user marked."""
 
     frame: Annotated[int, Field(ge=0)]
-    """Which frame it was marked in [frame]."""
+    """Which frame it was marked in, of those that the clip is read at [frame]."""
     x: float
-    """To the right, at the working size [px]."""
+    """To the right, in the recording as it came [px]."""
     y: float
-    """Down, at the working size [px]."""
+    """Down, in the recording as it came [px]."""
     label: Literal["tool", "tissue"] = "tool"
     """What is there [name]."""
 

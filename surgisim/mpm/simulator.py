@@ -6,11 +6,11 @@ memory allowed is walked in several stretches.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import warp as wp
@@ -207,6 +207,35 @@ class Simulator(Nodes):
             self._check(before, state, trouble, theta, drive, frame)
             yield state, task.u[slot]
 
+    def play_along(
+        self,
+        theta: np.ndarray,
+        drive: Drive,
+        course: Iterable[tuple[np.ndarray, np.ndarray]],
+        *,
+        begin: State | None = None,
+    ) -> Iterator[tuple[State, wp.array]]:
+        """As `play`, where what the anchors do in a frame is known only once that frame begins.
+
+        drive: of one frame; what is held, and by which springs. course: for each frame the anchors' displacement at
+        its steps and after the last [m], (1 + J, S + 1, 3), and how firmly they hold in each step, 0-1, (1 + J, S).
+        """
+        with self.stream.turn():
+            task = self._task(theta, drive, 2)
+            self._load(task, begin or (), 0)
+        state, _ = self._arrived(task, 0)
+        yield state, task.u[0]
+        for frame, (path, hold) in enumerate(course):
+            now = replace(drive, path=np.asarray(path, float), hold=np.asarray(hold, float))
+            with self.stream.turn():
+                task.anchors.path.assign(now.path.astype(self.real))
+                task.anchors.hold.assign(now.hold.astype(self.real))
+                self._load(task, state, 0)
+                task.forward.march(drive.per_frame)
+            before, (state, trouble) = state, self._arrived(task, drive.per_frame % 2)
+            self._check(before, state, trouble, theta, now, 0, frame)
+            yield state, task.u[drive.per_frame % 2]
+
     # Backward
 
     def gradient(
@@ -304,7 +333,7 @@ class Simulator(Nodes):
         theta = np.asarray(theta)
         if theta.shape != (self.count, self.laws.columns):
             raise Problem(f"theta is {theta.shape}, but ({self.count}, {self.laws.columns}) is wanted.")
-        s, laws = self.types, choose(self.terms)
+        s, laws, anchors = self.types, choose(self.terms), self._anchors(drive)
         density = np.full(self.count, self.density)
         for name in self.laws.mass:
             density = density + theta[:, columns(laws).index(f"{name}.{laws[name].mass}")]
@@ -314,7 +343,7 @@ class Simulator(Nodes):
         q = self._zeros((slots, self.count if self.width else 1), self.laws.Memory)
         inputs = [
             self.volume, self._put(density[self.order], s.real), self.rest_d, self._put(theta[self.order], s.real),
-            self._anchors(drive), s.real(drive.step), slots, u, v, q,
+            anchors, s.real(drive.step), slots, u, v, q,
         ]  # fmt: skip
         step = [
             self.clock, int(self.layout.ticks), self.mass, self.gravity, self.rule.shape[1], s.real(drive.step), slots,
@@ -325,7 +354,7 @@ class Simulator(Nodes):
             [wp.launch(self.nodes.step, len(self.place), step, device=self.device, record_cmd=True)],
             *self._tick(1),
         ]
-        return _Task(slots, u, v, q, inputs, March(forward, self.device))
+        return _Task(slots, u, v, q, anchors, inputs, March(forward, self.device))
 
     def _tick(self, by: int) -> Phases:
         if self.layout.ticks:
@@ -397,15 +426,26 @@ class Simulator(Nodes):
         return rows
 
     def _check(
-        self, before: State, after: State, trouble: np.ndarray, theta: np.ndarray, drive: Drive, frame: int
+        self,
+        before: State,
+        after: State,
+        trouble: np.ndarray,
+        theta: np.ndarray,
+        drive: Drive,
+        frame: int,
+        gone: int = 0,
     ) -> None:
-        """Stop where the last frame went wrong, and say where, when and by which law."""
+        """Stop where the last frame went wrong, and say where, when and by which law.
+
+        gone: frames of the run before those of the drive.
+        """
         step, sorted_particle = min(trouble.tolist())
         if step == NEVER and np.isfinite(after[0]).all():
             return
         if step == NEVER:
             raise Breakdown(
-                f"simulation: a displacement is not finite between frames {frame} and {frame + 1}. Take a smaller step."
+                f"simulation: a displacement is not finite between frames {gone + frame} and {gone + frame + 1}. "
+                "Take a smaller step."
             )
         particle = int(self.order[sorted_particle])
         count = max(0, step - frame * drive.per_frame - 1)
@@ -414,11 +454,11 @@ class Simulator(Nodes):
             self._load(task, before, frame * drive.per_frame)
             task.forward.march(count)
         law = culprit(self, theta, self._arrived(task, count % 2)[0], particle)
-        where = np.round(self.rest[particle], 4).tolist()
+        where, total = np.round(self.rest[particle], 4).tolist(), gone * drive.per_frame + step
         raise Breakdown(
             f"simulation: particle {particle} at rest position {where} m turned inside out (or stopped being a "
-            f"number) at step {step} ({step * drive.step:.4f} s), where {law} pushed hardest. Its load is too violent "
-            "for this tissue or the step too large: take a smaller step, a gentler motion, or a stiffer tissue.",
+            f"number) at step {total} ({total * drive.step:.4f} s), where {law} pushed hardest. Its load is too "
+            "violent for this tissue or the step too large: take a smaller step, a gentler motion or a stiffer tissue.",
             particle,
         )
 
@@ -429,6 +469,8 @@ class _Task:
     u: wp.array
     v: wp.array
     q: wp.array
+    anchors: Any
+    """Struct of arrays: what is held, and where it is carried."""
     inputs: list
     forward: March
 

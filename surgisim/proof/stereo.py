@@ -88,7 +88,7 @@ def measured(settings: Phantom, backends: list[str]) -> dict[str, float]:
         frames, camera, given = ingest(
             folder, Ingest(focal=settings.focal * settings.width, fps=settings.fps, baseline=BASELINE), progress=quiet
         )
-    found = masks(frames, given, Masking(), progress=quiet)
+    found = masks(frames, given, camera, Masking(), progress=quiet)
     inpainted = without_tool(frames, found, Inpainting(), progress=quiet)
     surface = correspond(frames, found, Correspondence(), progress=quiet)
     to = seen(truth, camera)

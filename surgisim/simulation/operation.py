@@ -5,7 +5,7 @@
             {"act": "release", "time": 1.6},
             {"act": "cut", "along": [[40, 60], [90, 60]], "depth": 0.006, "time": 0.1}]}
 
-Places are pixels of frame 0 (two numbers) or points of the camera frame in metres (three);
+Places are pixels of the recording's first frame (two numbers) or points of the camera frame in metres (three);
 displacements are metres of the camera frame (x right, y down, z away from the camera).
 """
 
@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
+from scipy.interpolate import PchipInterpolator
 
 from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.motion import Motion
@@ -23,6 +24,10 @@ from surgisim.config.base import Settings, parse
 from surgisim.mpm.cut import Cut
 from surgisim.problem import Problem
 
+GRIP = 1.5
+"""Radius of a grip that says none [grid spacing]."""
+EARLY = 1e-9
+"""Times that were rounded when they were written still mean their frame [s]."""
 Place = tuple[float, float] | tuple[float, float, float]
 Vector = tuple[float, float, float]
 
@@ -48,6 +53,26 @@ class Push(Settings):
     end: float = Field(gt=0)
     until: float | None = Field(None, gt=0)
     radius: float | None = Field(None, gt=0)
+
+
+class Carry(Settings):
+    """Take a ball of tissue and carry it along a path: what somebody did by hand in the viewer."""
+
+    act: Literal["carry"]
+    at: Place
+    path: list[tuple[float, float, float, float]] = Field(min_length=2)
+    """Time [s] and displacement along x, y and z [m]; between them it goes smoothly."""
+    until: float | None = Field(None, gt=0)
+    """When it is let go; none is the end, or a release [s]."""
+    radius: float | None = Field(None, gt=0)
+
+    @property
+    def begin(self) -> float:
+        return self.path[0][0]
+
+    @property
+    def end(self) -> float:
+        return self.path[-1][0]
 
 
 class Release(Settings):
@@ -81,7 +106,7 @@ class Operation(Settings):
 
     name: str = "operation"
     seconds: float = Field(gt=0, le=600)
-    do: list[Annotated[Pull | Push | Release | Shake | Slit, Field(discriminator="act")]]
+    do: list[Annotated[Pull | Push | Carry | Release | Shake | Slit, Field(discriminator="act")]]
 
 
 @dataclass(frozen=True)
@@ -123,15 +148,14 @@ def plan(raw: dict[str, Any], rest: np.ndarray, surface: np.ndarray, camera: Cam
         if isinstance(act, Shake):
             on = (clock >= begin) & (clock <= end)
             base += np.where(on, np.sin(2 * np.pi * act.frequency * (clock - begin)), 0.0)[:, None] * np.array(act.by)
-        elif isinstance(act, Pull | Push):
+        elif isinstance(act, Pull | Push | Carry):
             point = _point(act.at, top, camera, act.act)
-            let_go = act.until if isinstance(act, Push) else None
+            let_go = None if isinstance(act, Pull) else act.until
             until = min([t for t in [*releases, let_go] if t is not None and t > begin], default=np.inf)
-            s = np.clip((clock - begin) / (end - begin), 0, 1)
             centers.append(point)
-            radii.append(act.radius or 1.5 * spacing)
-            positions.append(point + (s * s * (3 - 2 * s))[:, None] * np.array(act.by))
-            active.append((clock >= begin) & (clock <= until))
+            radii.append(act.radius or GRIP * spacing)
+            positions.append(point + _displacement(act, clock))
+            active.append((clock >= begin - EARLY) & (clock <= until + EARLY))
     motion = Motion(
         center_rest=np.array(centers).reshape(-1, 3),
         radius=np.array(radii, float),
@@ -150,19 +174,32 @@ def plan(raw: dict[str, Any], rest: np.ndarray, surface: np.ndarray, camera: Cam
     return Plan(motion, base, cut, frame)
 
 
+def _displacement(act: Pull | Push | Carry, clock: np.ndarray) -> np.ndarray:
+    """Of what is held, at times [s], (T,): [m], (T, 3)."""
+    if isinstance(act, Carry):
+        path = np.array(act.path)
+        if (np.diff(path[:, 0]) <= 0).any():
+            raise Problem("operation: the times of a 'carry' path must grow from one entry to the next. Sort them.")
+        return PchipInterpolator(path[:, 0], path[:, 1:])(np.clip(clock, act.begin, act.end))
+    s = np.clip((clock - act.begin) / (act.end - act.begin), 0, 1)
+    return (s * s * (3 - 2 * s))[:, None] * np.array(act.by)
+
+
 def _point(place: Place, top: np.ndarray, camera: Camera, act: str) -> np.ndarray:
     """A place on the tissue: as given, or where the pixel's ray meets the seen surface."""
     if len(place) == 3:
         return np.array(place, float)
-    distance = np.linalg.norm(camera.project(top) - np.array(place), axis=1)
+    pixel = camera.from_recording(place)
+    distance = np.linalg.norm(camera.project(top) - pixel, axis=1)
     near = np.argsort(distance, kind="stable")[:4]
     reach = 3 * np.sqrt(camera.width * camera.height / max(len(top), 1))
     if distance[near[0]] > max(reach, 4):
         raise Problem(
-            f"operation: '{act}' at pixel {list(place)} meets no tissue; the nearest lies {distance[near[0]]:.0f} px "
-            f"away. Choose a pixel of the {camera.width} x {camera.height} frame 0 that shows tissue."
+            f"operation: '{act}' at pixel {list(place)} of the recording meets no tissue; the nearest lies "
+            f"{distance[near[0]] * camera.crop[2] / camera.width:.0f} px away. Choose a pixel of the first frame, "
+            f"{camera.source_size[0]} x {camera.source_size[1]} px, that shows tissue."
         )
-    return camera.lift(np.array(place, float), np.median(top[near, 2]))
+    return camera.lift(pixel, np.median(top[near, 2]))
 
 
 def read_operation(path: Path) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """Run the recorded manipulation, or a new one, on a fitted body."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -20,7 +19,7 @@ from surgisim.config.simulation import Simulation
 from surgisim.gaussians.rim import beyond
 from surgisim.mpm.carried import Carried
 from surgisim.mpm.grip import Drive
-from surgisim.mpm.setup import SKIN, Prepared, checked_per_frame, prepare, theta_of, values_of
+from surgisim.mpm.setup import Prepared, checked_per_frame, theta_of, values_of
 from surgisim.mpm.simulator import Run, Simulator
 from surgisim.physics.catalogue import choose, defaults
 from surgisim.problem import Problem
@@ -28,9 +27,7 @@ from surgisim.side_by_side import in_order
 from surgisim.simulation.draw import Drawn
 from surgisim.simulation.operation import Plan, plan
 from surgisim.simulation.relight import Light, find_light
-
-THREADS = 2
-"""Threads of a run on a CPU; fixed, so that a replay has the same bytes on every number of cores."""
+from surgisim.simulation.setup import bodies, boundary, held_at_rim, recorded_task
 
 
 def replay(
@@ -58,20 +55,20 @@ def replay(
     if len(theta) != len(body.rest):
         raise Problem(f"material.npz has {len(theta)} particles, but body.npz has {len(body.rest)}. Pass a pair.")
     task = (
-        _recorded(motion, camera)
+        recorded_task(motion, camera)
         if settings.operation is None
-        else _held_at_rim(plan(settings.operation, body.rest, body.surface, camera, body.spacing), motion)
+        else held_at_rim(plan(settings.operation, body.rest, body.surface, camera, body.spacing), motion)
     )
     per_frame = checked_per_frame(physics, material, camera.fps) * settings.refine_step
     rim = beyond(scene, camera)
-    parts = _parts(body, [scene, rim], physics, task, settings.device)
+    parts = bodies(body, [scene, rim], physics, task, settings.device)
     whole, joules = parts[0].simulator, None
 
     def half(done: float, total: float, text: str) -> None:
         progress(0.5 * done, total, text)
 
     if settings.solver == "mpm":
-        path = _path(parts[0], task, physics, material, camera, per_frame)
+        path = boundary(parts[0], task, physics, material, camera, per_frame)
         states = _march([p.simulator for p in parts], theta, path, task, half)
     else:
         run, joules = _baseline(parts, task, physics, material, camera, settings, half)
@@ -81,9 +78,9 @@ def replay(
     if recording is not None and settings.render and settings.relight:
         recorded = [run.u[k] for _, run, k in (states[t] for t in range(frames))]
         if settings.operation is not None:
-            again = _recorded(motion, camera)
+            again = recorded_task(motion, camera)
             if settings.solver == "mpm":
-                recorded = whole.run(theta, _path(parts[0], again, physics, material, camera, per_frame)).u
+                recorded = whole.run(theta, boundary(parts[0], again, physics, material, camera, per_frame)).u
             else:
                 recorded = _baseline(parts, again, physics, material, camera, settings, half)[0].u
 
@@ -129,48 +126,6 @@ def replay(
     )
 
 
-def _recorded(motion: Motion, camera: Camera) -> Plan:
-    return Plan(motion, np.zeros((camera.frames, 3)), None, 0)
-
-
-def _held_at_rim(task: Plan, recorded: Motion) -> Plan:
-    """An operation on a body that the recording carries along its edge, which stays with the base now."""
-    rim = recorded.rim[:, :1] + task.base
-    return replace(task, motion=replace(task.motion, rim=rim, rim_radius=recorded.rim_radius))
-
-
-def _path(made: Prepared, task: Plan, physics: Physics, material: Material, camera: Camera, per_frame: int) -> Drive:
-    """The boundary condition of a task at every step."""
-    path = made.drive(
-        task.motion,
-        values_of(physics),
-        fps=camera.fps,
-        per_frame=per_frame,
-        frames=len(task.base),
-        held=material.held,
-        grip=physics.grip,
-        firm=False,
-    )
-    clock = np.arange(path.steps + 1) / per_frame
-    path.path[0] = np.stack([np.interp(clock, np.arange(len(task.base)), task.base[:, a]) for a in range(3)], -1)
-    return path
-
-
-def _parts(body: Body, scenes: list[Scene], physics: Physics, task: Plan, device: str) -> list[Prepared]:
-    """The whole body and, when something is cut, the cut one."""
-    carried = np.concatenate([s.mean for s in scenes]).astype(float)
-    make = [None] if task.cut is None else [None, task.cut]
-    return [
-        prepare(
-            body, tuple(physics.terms), density=physics.density, gravity=tuple(physics.gravity),
-            carried=carried, cut=cut, device=device, form=physics.form, threads=THREADS,
-            grips=task.motion,
-            skin=SKIN,
-        )
-        for cut in make
-    ]  # fmt: skip
-
-
 def _baseline(
     parts: list[Prepared],
     task: Plan,
@@ -187,7 +142,7 @@ def _baseline(
         settings.solver,
         parts[0],
         values_of(physics),
-        lambda per_frame: _path(parts[0], task, physics, material, camera, per_frame),
+        lambda per_frame: boundary(parts[0], task, physics, material, camera, per_frame),
         fps=camera.fps,
         refine=settings.refine_step,
         progress=progress,

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from recordings import H, W, operated, silent, tissue
 
+from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.given import Given
 from surgisim.config.masking import Click, Masking
@@ -17,13 +18,23 @@ def nothing_given(size) -> Given:
     return Given(np.zeros((0, *size), bool), np.zeros((0, *size), "f4"), np.zeros((0, *size, 3), np.uint8), 0.0)
 
 
-def masked(rgb, given=None, said=None, **settings):
+def uncut(rgb, **changed) -> Camera:
+    """Of a recording that is neither cropped nor resized, unless that is changed."""
+    count, height, width = rgb.shape[:3]
+    lens = {"fx": width, "fy": width, "cx": width / 2, "cy": height / 2, "fps": 25.0, "frames": count}
+    said = {"scale": "arbitrary", "focal_from": "assumed", "source": "made up"}
+    whole = {"source_size": [width, height], "crop": [0, 0, width, height]}
+    return Camera(width, height, **(lens | said | whole | changed))
+
+
+def masked(rgb, given=None, said=None, camera=None, **settings):
     def listen(done, total, text=""):
         if said is not None and done == total:
             said.append(text)
 
     frames = Frames(rgb, np.zeros(len(rgb), np.uint8))
-    return masks(frames, given or nothing_given(rgb.shape[1:3]), Masking(**settings), progress=listen)
+    given = given or nothing_given(rgb.shape[1:3])
+    return masks(frames, given, camera or uncut(rgb), Masking(**settings), progress=listen)
 
 
 def overlap(a, b):

@@ -36,7 +36,7 @@ def test_a_real_grip_is_found_and_let_go_where_and_when_it_is(shared, name):
     frames, camera, given = ingest(
         shared / "data" / clip["recording"], parse(Ingest, settings, "ingest"), progress=silent
     )
-    found = masks(frames, given, Masking(), progress=silent)
+    found = masks(frames, given, camera, Masking(), progress=silent)
     surface = correspond(frames, found, Correspondence())
     flat = np.full(found.tool.shape, 0.1, np.float32)
     depth = Depth(flat, np.ones_like(flat), "known")

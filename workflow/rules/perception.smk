@@ -30,6 +30,7 @@ rule masking:
     input:
         frames=upstream("ingest", "frames.npz"),
         given=upstream("ingest", "given.npz"),
+        camera=upstream("ingest", "camera.json"),
     output:
         masks="results/{clip}/{variant}/masking/masks.npz",
     log:
@@ -47,7 +48,7 @@ rule masking:
         code=code("masking"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/masking.py"'
-        " --frames {input.frames} --given {input.given} --masks {output.masks}"
+        " --frames {input.frames} --given {input.given} --camera {input.camera} --masks {output.masks}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 

@@ -15,8 +15,7 @@ def given(wanted: tuple[Grasp, ...], camera: Camera, tissue: np.ndarray) -> list
 
 def _grip(grasp: Grasp, camera: Camera, tissue: np.ndarray, where: str) -> Grip:
     left, top, width, height = camera.crop
-    scale = np.array([camera.width / width, camera.height / height])
-    center = (np.array(grasp.pixel) - [left, top] + 0.5) * scale - 0.5
+    center = camera.from_recording(grasp.pixel)
     x, y = np.rint(center).astype(int)
     if not (0 <= x < camera.width and 0 <= y < camera.height):
         raise Problem(
@@ -33,4 +32,10 @@ def _grip(grasp: Grasp, camera: Camera, tissue: np.ndarray, where: str) -> Grip:
             f"{where}: it lasts from {grasp.start} to {end:.2f} s, and the recording from 0 to {last:.2f} s. "
             "Give a start before the end, within the recording."
         )
-    return Grip(center, float(grasp.radius * scale.mean()), begin, min(stop, camera.frames - 1), 1.0)
+    return Grip(
+        center,
+        float(grasp.radius * np.mean([camera.width / width, camera.height / height])),
+        begin,
+        min(stop, camera.frames - 1),
+        1.0,
+    )

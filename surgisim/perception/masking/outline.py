@@ -8,6 +8,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
+from surgisim.artifacts.camera import Camera
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.given import Given
 from surgisim.artifacts.masks import Masks
@@ -19,9 +20,9 @@ from surgisim.problem import Problem
 Progress = Callable[[float, float, str], None]
 
 
-def masks(frames: Frames, given: Given, settings: Masking, *, progress: Progress) -> Masks:
+def masks(frames: Frames, given: Given, camera: Camera, settings: Masking, *, progress: Progress) -> Masks:
     """Instrument by the chosen backend; tissue is what is lit, at some distance from it."""
-    _check_clicks(frames, settings)
+    settings = _with_working_clicks(settings, camera)
     name = settings.backend
     if name == "auto":
         name = "given" if len(given.tool) else "colour_motion"
@@ -43,14 +44,21 @@ def _backend(name: str) -> Callable:
     return importlib.import_module(f"{masking.__name__}.{name}").tool
 
 
-def _check_clicks(frames: Frames, settings: Masking) -> None:
-    count, height, width = frames.rgb.shape[:3]
+def _with_working_clicks(settings: Masking, camera: Camera) -> Masking:
+    """The same with clicks in working pixels. Raises Problem for one outside of the clip."""
+    clicks = []
     for click in settings.clicks:
-        if not (click.frame < count and 0 <= click.x <= width - 1 and 0 <= click.y <= height - 1):
+        x, y = camera.from_recording([click.x, click.y])
+        if not (click.frame < camera.frames and -0.5 <= x <= camera.width - 0.5 and -0.5 <= y <= camera.height - 0.5):
+            left, top, width, height = camera.crop
             raise Problem(
                 f"config key 'masking.clicks' marks frame {click.frame} at ({click.x:g}, {click.y:g}), but there are "
-                f"{count} frames of {width} x {height} px. Give clicks at the working size."
+                f"{camera.frames} frames, which show x {left} to {left + width - 1} and y {top} to {top + height - 1} "
+                "of the recording. Give clicks in the recording's own pixels."
             )
+        inside = np.clip([x, y], 0, [camera.width - 1, camera.height - 1])
+        clicks.append(click.model_copy(update={"x": float(inside[0]), "y": float(inside[1])}))
+    return settings.model_copy(update={"clicks": clicks})
 
 
 def _say_what_was_found(tool, confidence, name: str, settings: Masking, progress: Progress) -> None:
