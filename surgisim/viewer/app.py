@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 import viser
 
@@ -119,7 +120,8 @@ class Viewer:
 
     def _draw_controls(self) -> None:
         gui, case = self.server.gui, self.case
-        gui.configure_theme(control_layout="fixed", control_width="large", show_logo=False, show_share_button=False)
+        gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+        gui.main_panel.dock_right()
         gui.add_markdown(about(case))
         self.layer = gui.add_dropdown("show", LAYERS)
         self.physics_on = gui.add_checkbox(
@@ -152,6 +154,7 @@ class Viewer:
             self.reset = gui.add_button("Back to rest")
             self.clear = gui.add_button("Remove grips and cut")
             self.export = gui.add_button("Export operation")
+            self.paced = gui.add_markdown("")
             self.said = gui.add_markdown("Choose what to do, then click on the tissue.")
         with tabs.add_tab("Parameters"):
             gui.add_markdown(parameters(case))
@@ -176,8 +179,7 @@ class Viewer:
             self.todo.put(does)
 
     def _small(self, rgb: np.ndarray) -> np.ndarray:
-        every = max(1, rgb.shape[1] // PICTURE)
-        return np.ascontiguousarray(rgb[::every, ::every])
+        return cv2.resize(rgb, (PICTURE, round(PICTURE * rgb.shape[0] / rgb.shape[1])), interpolation=cv2.INTER_AREA)
 
     def say(self, words: str) -> None:
         self.said.content = words
@@ -298,7 +300,7 @@ class Viewer:
         )
         self.gizmos.append(arrows)
         self.server.scene.add_icosphere(
-            f"{name}/ball", radius=SCALE * self.grasps[-1].radius, color=GRIPPED, opacity=0.4
+            f"{name}/ball", radius=SCALE * self.grasps[-1].radius, color=GRIPPED, opacity=0.15
         )
         self._stale()
 
@@ -389,7 +391,8 @@ class Viewer:
         self._show_state()
         self._spent.append(time.perf_counter() - began)
         if hand.frame % 10 == 0:
-            self.say(f"{hand.frame / self.case.camera.fps:.2f} s of tissue's time, {self.rate:.1f} frames a second")
+            gone = hand.frame / self.case.camera.fps
+            self.paced.content = f"{gone:.2f} s of tissue's time, {self.rate:.1f} frames a second"
 
     @property
     def rate(self) -> float:

@@ -80,6 +80,37 @@ class Browser:
         command = {"cmd": "Emulation.setDeviceMetricsOverride", "params": metrics}
         self._call("POST", "/goog/cdp/execute", command)
 
+    def press(self, words: str) -> None:
+        """Click on the button, tab or other piece of the page that shows just these words."""
+        script = """
+            for (let n = 0; n < 50; n++) {
+                const all = [...document.querySelectorAll('button, [role=tab], label, a')];
+                const one = all.find(e => e.textContent.trim() === WORDS);
+                if (one) {
+                    one.scrollIntoView({block: 'center'});
+                    const box = one.getBoundingClientRect();
+                    return [box.x + box.width / 2, box.y + box.height / 2];
+                }
+                await new Promise(later => setTimeout(later, 100));
+            }
+            return null"""
+        found = self.run(script.replace("WORDS", json.dumps(words)))
+        assert isinstance(found, list), f"the page has nothing to press that says {words!r}"
+        self.drag(tuple(found))
+
+    def drag(self, *points: tuple[float, float], pause: int = 60) -> None:
+        """Press the mouse at the first point [px], move over the others, let go at the last; one point is a click."""
+
+        def to(point: tuple[float, float]) -> dict:
+            x, y = map(round, point)
+            return {"type": "pointerMove", "duration": pause, "x": x, "y": y, "origin": "viewport"}
+
+        first, *others = points
+        held = [{"type": "pause", "duration": pause}, *map(to, others)]
+        moves = [to(first), {"type": "pointerDown", "button": 0}, *held, {"type": "pointerUp", "button": 0}]
+        mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": moves}
+        self._call("POST", "/actions", {"actions": [mouse]})
+
     def screenshot(self) -> bytes:
         """What the window shows, as PNG."""
         return base64.b64decode(self._call("GET", "/screenshot"))
