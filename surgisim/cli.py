@@ -29,7 +29,7 @@ DryRun = Annotated[bool, typer.Option("--dry-run", "-n", help="Only say what wou
 Diagnose = Annotated[bool, typer.Option("--diagnose", help="Also say what physics the simulation lacks.")]
 Debug = Annotated[bool, typer.Option(help="Show everything Snakemake says, and tracebacks.")]
 
-GRASP = "What the tool holds: middle and radius in the recording's first frame [px], from when to when [s]."
+GRASP = "What the tool holds: middle and radius in the first frame [px], from when to when [s]; or pick's JSON."
 CLICKS = "JSON list of points on tool or tissue: {frame, x, y, label}, in the recording's pixels [px]."
 
 
@@ -39,7 +39,7 @@ def run(
     out: Out = Path(),
     name: Annotated[str | None, typer.Option(help="What to call the clip; its file name unless said.")] = None,
     focal: Annotated[float | None, typer.Option(help="Focal length in the recording's own pixels [px].")] = None,
-    grasp: Annotated[str | None, typer.Option(metavar="X,Y,R[,START[,END]]", help=GRASP)] = None,
+    grasp: Annotated[str | None, typer.Option(metavar="X,Y,R[,START[,END]]|JSON", help=GRASP)] = None,
     clicks: Annotated[Path | None, typer.Option(help=CLICKS)] = None,
     operation: Operation = None,
     variant: Variant = None,
@@ -57,7 +57,7 @@ def run(
     from surgisim.order import Order, called, carry_out
 
     extra = [f"focal={focal}"] if focal is not None else []
-    extra += [f"grasp={grasp}"] if grasp else []
+    extra += [f"grasp={'@' if grasp.endswith('.json') else ''}{grasp}"] if grasp else []
     extra += [f"clicks=@{clicks}"] if clicks else []
     with plain_errors(debug):
         order = Order(
@@ -179,6 +179,36 @@ def view(
             typer.echo("ended.")
         finally:
             viewer.close()
+
+
+@app.command()
+def pick(
+    clip: Annotated[Path, typer.Argument(help="A video, image folder, EndoNeRF folder or zip.")],
+    out: Annotated[Path, typer.Option(help="Folder for NAME.clicks.json and NAME.grasp.json.")] = Path(),
+    config: Config = None,
+    set_: Set = None,
+    host: Host = "localhost",
+    port: Port = 8080,
+    token: Token = None,
+    debug: Debug = False,
+) -> None:
+    """Mark instruments, tissue and what is held in a browser; writes what --clicks and --grasp take."""
+    with plain_errors(debug):
+        from surgisim.order import of_picking
+        from surgisim.viewer.gate import checked_token
+        from surgisim.viewer.pick import Picking, PickPage
+
+        checked_token(host, token)
+        settings = of_picking(tuple(config or ()), tuple(set_ or ()))
+        picking = Picking(clip, out, settings.ingest, settings.masking, progress=Progress("pick"))
+        page = PickPage(picking, host=host, port=port, token=token)
+        typer.echo(f"{page.address} shows it. Ctrl-C ends it.")
+        try:
+            page.wait()
+        except KeyboardInterrupt:
+            typer.echo("ended.")
+        finally:
+            page.close()
 
 
 @app.command()

@@ -76,7 +76,9 @@ def merge_entry(tree: dict[str, Any], key: str, text: str, folder: Path, where: 
 
 
 def _grip(content: Any, where: str) -> list[dict[str, Any]]:
-    """'X,Y,RADIUS' with an optional START and END as the settings of one grip."""
+    """'X,Y,RADIUS' with an optional START and END as the settings of one grip; a list of such settings as it is."""
+    if isinstance(content, list) and content and all(isinstance(entry, dict) for entry in content):
+        return content
     if not isinstance(content, list) or not 3 <= len(content) <= 5:
         raise Problem(
             f"{where}: grasp is {content!r}; X,Y,RADIUS is wanted, in pixels of the recording's first frame, and "

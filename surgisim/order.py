@@ -131,6 +131,11 @@ def of_diagnosis(configs: tuple[Path, ...], settings: tuple[str, ...]) -> Diagno
     return parse(Whole, chosen(configs, tuple(keys)), "diagnose").diagnosis
 
 
+def of_picking(configs: tuple[Path, ...], settings: tuple[str, ...]) -> Whole:
+    """The settings by which a clip is read and masked that is marked by hand."""
+    return parse(Whole, chosen(configs, settings), "pick")
+
+
 def _recording(clip: str) -> str:
     return EMBEDDED if clip == EMBEDDED else str(Path(clip).resolve())
 
