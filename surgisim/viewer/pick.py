@@ -148,7 +148,10 @@ class PickPage:
         try:
             kind, content = self._content(request.path, body)
             status = 200
-        except (Problem, ValidationError, ValueError, LookupError) as error:
+        except ValidationError as error:
+            words = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
+            kind, content, status = "text/plain; charset=utf-8", words.encode(), 400
+        except (Problem, ValueError, LookupError) as error:
             kind, content, status = "text/plain; charset=utf-8", str(error).encode(), 400
         request.send_response(status)
         request.send_header("Content-Type", kind)
