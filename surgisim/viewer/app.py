@@ -11,6 +11,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import cv2
@@ -69,6 +70,7 @@ class Viewer:
         self._followers: dict[int, Follower | FollowerOnDevice] = {}
         self.playing, self.running, self.tick = False, False, 0
         self._spent: deque[float] = deque(maxlen=30)
+        self._ahead = ThreadPoolExecutor(1)
         self._replay = Follower(case, GridNodes(case.replay.origin, case.replay.shape, case.replay.spacing))
         self._reconstructed = Reconstructed(case)
         self._middle = SCALE * np.array([0.0, 0.0, float(np.median(case.scene.mean[:, 2]))])
@@ -227,12 +229,15 @@ class Viewer:
             self.gripped.points = (SCALE * replay.position[t][self._gripped]).astype(np.float32)
 
     def _show_state(self) -> None:
-        """The body under the hand."""
+        """The body under the hand, as it is now."""
         hand = self.hand
         if not self.physics_on.value:
             self._put(self._without_physics(hand.offsets))
             return
-        follower, u = self._follower(), hand.state[0]
+        self._show_body(self._follower(), hand.state[0])
+
+    def _show_body(self, follower: Follower | FollowerOnDevice, u: np.ndarray) -> None:
+        """At displacements of its nodes [m], (A, 3)."""
         if self.layer.value == "splats":
             self._put(follower.scene(u))
         elif isinstance(follower, FollowerOnDevice):
@@ -326,6 +331,7 @@ class Viewer:
     def _start(self) -> None:
         if self.running:
             self.running, self.start.label = False, "Go on"
+            self._show_state()
             return
         if self.hand is None:
             if not self.grasps and self.cut is None:
@@ -383,12 +389,22 @@ class Viewer:
     # The loop
 
     def step(self) -> None:
-        """One frame by hand: grips toward where they were dragged, and the body after them."""
+        """One frame by hand: grips toward where they were dragged, and the body after them.
+
+        It is simulated while the frame before is sent to the page.
+        """
         hand = self.hand
         wanted = [np.array(g.position) / SCALE - c.center for g, c in zip(self.gizmos, hand.grasps, strict=True)]
         began = time.perf_counter()
-        hand.advance(np.array(wanted).reshape(-1, 3), np.full(len(hand.grasps), self._holding))
-        self._show_state()
+        follower, u = self._follower(), hand.state[0]
+        ahead = self._ahead.submit(
+            hand.advance, np.array(wanted).reshape(-1, 3), np.full(len(hand.grasps), self._holding)
+        )
+        if self.physics_on.value:
+            self._show_body(follower, u)
+        ahead.result()
+        if not self.physics_on.value:
+            self._show_state()
         self._spent.append(time.perf_counter() - began)
         if hand.frame % 10 == 0:
             gone = hand.frame / self.case.camera.fps
@@ -430,6 +446,7 @@ class Viewer:
 
     def close(self) -> None:
         self.over.set()
+        self._ahead.shutdown()
         self.gate.close()
         with contextlib.redirect_stdout(io.StringIO()):
             self.server.stop()
