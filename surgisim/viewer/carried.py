@@ -94,14 +94,18 @@ class FollowerOnDevice:
 
         self.index = torch.as_tensor(index, device="cuda")
         self.weight, self.slope = put(link[..., 0]), put(link[..., 1:])
+        # One of its own: on the default stream it would wait for the steps that are simulated meanwhile, or break their
+        # capture.
+        self.stream = torch.cuda.Stream()
         self.mean, self.factor, self.eye = put(SCALE * mean), put(SCALE * factors(rotation, scale)), put(np.eye(3))
 
     def scene(self, u: np.ndarray) -> Shown:
         """At displacements of the solid nodes [m], (A, 3)."""
-        moved = torch.as_tensor(np.ascontiguousarray(u, np.float32), device="cuda")[self.index]
-        center = self.mean + SCALE * torch.einsum("gk,gka->ga", self.weight, moved)
-        factor = (self.eye + torch.einsum("gka,gkb->gab", moved, self.slope)) @ self.factor
-        return Shown(center.cpu().numpy(), (factor @ factor.transpose(1, 2)).cpu().numpy())
+        with torch.cuda.stream(self.stream):
+            moved = torch.as_tensor(np.ascontiguousarray(u, np.float32), device="cuda")[self.index]
+            center = self.mean + SCALE * torch.einsum("gk,gka->ga", self.weight, moved)
+            factor = (self.eye + torch.einsum("gka,gkb->gab", moved, self.slope)) @ self.factor
+            return Shown(center.cpu().numpy(), (factor @ factor.transpose(1, 2)).cpu().numpy())
 
 
 class Reconstructed:
