@@ -215,26 +215,31 @@ class Simulator(Nodes):
         *,
         begin: State | None = None,
     ) -> Iterator[tuple[State, wp.array]]:
-        """As `play`, where what the anchors do in a frame is known only once that frame begins.
+        """As `play`, where what the anchors do in a frame, or a part of it, is known only once that begins.
 
-        drive: of one frame; what is held, and by which springs. course: for each frame the anchors' displacement at
-        its steps and after the last [m], (1 + J, S + 1, 3), and how firmly they hold in each step, 0-1, (1 + J, S).
+        drive: of one frame; what is held, and by which springs. course: for each part the anchors' displacement at its
+        steps and after the last [m], (1 + J, S + 1, 3), and how firmly they hold in each step, 0-1, (1 + J, S); S is
+        at most a frame's.
         """
         with self.stream.turn():
             task = self._task(theta, drive, 2)
             self._load(task, begin or (), 0)
         state, _ = self._arrived(task, 0)
         yield state, task.u[0]
-        for frame, (path, hold) in enumerate(course):
-            now = replace(drive, path=np.asarray(path, float), hold=np.asarray(hold, float))
+        gone = 0
+        for path, hold in course:
+            steps = hold.shape[1]
+            now = replace(drive, path=np.asarray(path, float), hold=np.asarray(hold, float), per_frame=steps)
+            left = (0, 0), (0, drive.per_frame - steps)
             with self.stream.turn():
-                task.anchors.path.assign(now.path.astype(self.real))
-                task.anchors.hold.assign(now.hold.astype(self.real))
+                task.anchors.path.assign(np.pad(now.path, (*left, (0, 0))).astype(self.real))
+                task.anchors.hold.assign(np.pad(now.hold, left).astype(self.real))
                 self._load(task, state, 0)
-                task.forward.march(drive.per_frame)
-            before, (state, trouble) = state, self._arrived(task, drive.per_frame % 2)
-            self._check(before, state, trouble, theta, now, 0, frame)
-            yield state, task.u[drive.per_frame % 2]
+                task.forward.march(steps)
+            before, (state, trouble) = state, self._arrived(task, steps % 2)
+            self._check(before, state, trouble, theta, now, 0, gone)
+            gone += steps
+            yield state, task.u[steps % 2]
 
     # Backward
 
@@ -437,15 +442,15 @@ class Simulator(Nodes):
     ) -> None:
         """Stop where the last frame went wrong, and say where, when and by which law.
 
-        gone: frames of the run before those of the drive.
+        gone: steps of the run before those of the drive.
         """
         step, sorted_particle = min(trouble.tolist())
         if step == NEVER and np.isfinite(after[0]).all():
             return
         if step == NEVER:
             raise Breakdown(
-                f"simulation: a displacement is not finite between frames {gone + frame} and {gone + frame + 1}. "
-                "Take a smaller step."
+                f"simulation: a displacement is not finite between steps {gone + frame * drive.per_frame} and "
+                f"{gone + (frame + 1) * drive.per_frame}. Take a smaller step."
             )
         particle = int(self.order[sorted_particle])
         count = max(0, step - frame * drive.per_frame - 1)
@@ -454,7 +459,7 @@ class Simulator(Nodes):
             self._load(task, before, frame * drive.per_frame)
             task.forward.march(count)
         law = culprit(self, theta, self._arrived(task, count % 2)[0], particle)
-        where, total = np.round(self.rest[particle], 4).tolist(), gone * drive.per_frame + step
+        where, total = np.round(self.rest[particle], 4).tolist(), gone + step
         raise Breakdown(
             f"simulation: particle {particle} at rest position {where} m turned inside out (or stopped being a "
             f"number) at step {total} ({total * drive.step:.4f} s), where {law} pushed hardest. Its load is too "

@@ -69,6 +69,7 @@ class Viewer:
         self.hand: Manipulation | None = None
         self._followers: dict[int, Follower | FollowerOnDevice] = {}
         self.playing, self.running, self.tick = False, False, 0
+        self._unshown: tuple[Follower | FollowerOnDevice, np.ndarray] | None = None
         self._spent: deque[float] = deque(maxlen=30)
         self._ahead = ThreadPoolExecutor(1)
         self._replay = Follower(case, GridNodes(case.replay.origin, case.replay.shape, case.replay.spacing))
@@ -325,7 +326,7 @@ class Viewer:
 
     def _stale(self) -> None:
         """What was simulated does not fit what is placed now."""
-        self.hand, self.running, self._followers = None, False, {}
+        self.hand, self.running, self._followers, self._unshown = None, False, {}, None
         self.start.label = "Start"
 
     def _start(self) -> None:
@@ -353,6 +354,7 @@ class Viewer:
             self.say("Start first.")
             return
         self.hand.sever()
+        self._unshown = None
         self.say(f"Cut at {self.hand.cut_frame / self.case.camera.fps:.2f} s.")
 
     def _reset(self) -> None:
@@ -361,6 +363,7 @@ class Viewer:
             gizmo.position = SCALE * np.array(grasp.center)
         if self.hand is not None:
             self.hand.reset()
+            self._unshown = None
             self._show_state()
 
     def _clear(self) -> None:
@@ -391,28 +394,30 @@ class Viewer:
     def step(self) -> None:
         """One frame by hand: grips toward where they were dragged, and the body after them.
 
-        It is simulated while the frame before is sent to the page.
+        It is simulated while what was before is sent to the page.
         """
         hand = self.hand
         wanted = [np.array(g.position) / SCALE - c.center for g, c in zip(self.gizmos, hand.grasps, strict=True)]
-        began = time.perf_counter()
-        follower, u = self._follower(), hand.state[0]
-        ahead = self._ahead.submit(
-            hand.advance, np.array(wanted).reshape(-1, 3), np.full(len(hand.grasps), self._holding)
-        )
-        if self.physics_on.value:
-            self._show_body(follower, u)
-        ahead.result()
+        parts = hand.parts(np.array(wanted).reshape(-1, 3), np.full(len(hand.grasps), self._holding))
+        for _ in range(hand.count):
+            began = time.perf_counter()
+            ahead = self._ahead.submit(next, parts, None)
+            if self._unshown is not None and self.physics_on.value:
+                self._show_body(*self._unshown)
+            state = ahead.result()
+            if state is None:
+                break
+            self._unshown = self._follower(), state[0]
+            self._spent.append(time.perf_counter() - began)
         if not self.physics_on.value:
             self._show_state()
-        self._spent.append(time.perf_counter() - began)
         if hand.frame % 10 == 0:
             gone = hand.frame / self.case.camera.fps
             self.paced.content = f"{gone:.2f} s of tissue's time, {self.rate:.1f} frames a second"
 
     @property
     def rate(self) -> float:
-        """Frames by hand a second, of the last thirty."""
+        """States of the body a second that are simulated and sent, of the last thirty."""
         return len(self._spent) / max(sum(self._spent), 1e-9)
 
     def serve(self) -> None:
