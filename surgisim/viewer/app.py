@@ -203,6 +203,8 @@ class Viewer:
         with self.server.atomic():
             self.splats.centers = shown.center
             self.splats.covariances = shown.covariance
+        # Otherwise it waits for more to send, and frames are left out.
+        self.server.flush()
 
     def _put_body(self, positions: np.ndarray) -> None:
         self.particles.points = (SCALE * positions).astype(np.float32)
