@@ -14,9 +14,9 @@ import numpy as np
 
 from surgisim.artifacts.inpainted import COPIED, INVENTED, SEEN
 from surgisim.config.inpainting import Inpainting
-from surgisim.perception.flow import dense_flow
 from surgisim.perception.inpainting.smooth import continued
 from surgisim.perception.inpainting.source import Source, behind, followed, seen
+from surgisim.perception.optical_flow.dis import dense_flow
 from surgisim.perception.tracking.between import sample
 from surgisim.side_by_side import in_order
 
