@@ -53,11 +53,10 @@ def followed(
         for thing in things:
             thing.last.clear()
         for t in way:
-            if all(t in thing.masks for thing in things) and things and (way is back or t not in clicked):
+            if way is back and all(t in thing.masks for thing in things):
                 continue
-            frame = drawer.embedded(rgb[t])
-            here = [c for c in clicks if c.frame == t]
-            _draw(things, t, frame, rough[t], here if way is onward else [], drawer)
+            here = [c for c in clicks if c.frame == t and (way is onward or c.label == "tissue")]
+            _draw(things, t, drawer.embedded(rgb[t]), rough[t], here, drawer)
             progress(((t - onward.start) if way is onward else len(rgb) - 1 - t) / len(rgb))
     masks, sure = np.zeros(rough.shape, bool), np.zeros(len(rgb))
     for t in range(len(rgb)):
@@ -73,7 +72,7 @@ def _draw(things, t: int, frame: Embedded, rough: np.ndarray, clicks: Sequence[C
     known = [thing for thing in things if t not in thing.masks]
     likely = [belief(places, [*thing.shown, *thing.last], frame.size) for thing in known]
     marked: list[list[Point]] = [[] for _ in known]
-    outside = [(c.x, c.y, 0) for c in clicks if c.label == "tissue"]
+    tissue = [(c.x, c.y, 0) for c in clicks if c.label == "tissue"]
     for click in (c for c in clicks if c.label == "tool"):
         at = round(click.y), round(click.x)
         owner = int(np.argmax([each[at] for each in likely])) if likely else -1
@@ -88,7 +87,7 @@ def _draw(things, t: int, frame: Embedded, rough: np.ndarray, clicks: Sequence[C
     for k, thing in enumerate(known):
         others = [(x, y, 0) for j, each in enumerate(inner) if j != k for x, y in each[:1]]
         others += [(x, y, 0) for j, each in enumerate(marked) if j != k for x, y, _ in each]
-        mask, sure = _best(frame, likely[k], rough, marked[k], [*outside, *others], drawer)
+        mask, sure = _best(frame, likely[k], rough, [*marked[k], *tissue], others, drawer)
         thing.masks[t], thing.sure[t] = mask, sure
         if mask.any():
             remembered = remember(places, mask, everywhere=bool(marked[k]))
@@ -99,28 +98,38 @@ def _best(
     frame: Embedded,
     likely: np.ndarray,
     rough: np.ndarray,
-    marked: list[Point],
-    outside: list[Point],
+    clicked: list[Point],
+    others: list[Point],
     drawer: Drawer,
 ) -> tuple[np.ndarray, float]:
-    """The outline that agrees best with where a thing is likely to be, and how sure the network is of it."""
+    """The outline that agrees best with where a thing is likely to be, and how sure the network is of it.
+
+    clicked: of this thing and of tissue. others: what other things are shown by.
+    """
     guess = likely > 0.5
-    if not marked and guess.sum() < LEAST * guess.size:
+    shown = [at for at in clicked if at[2] == 1]
+    if not shown and guess.sum() < LEAST * guess.size:
         return np.zeros_like(guess), 0.0
-    coloured = _its_own(rough, guess, marked)
+    coloured = _its_own(rough, guess, shown)
     ideas = [each for each in (guess, coloured) if each.any()]
     answers = []
     for idea, hint in ((guess, np.clip(likely, 0, 1)), (coloured, coloured)):
-        points = marked + [(x, y, 1) for x, y in inner_points(idea, POINTS)] + outside
         if idea.any():
+            points = [*clicked, *((x, y, 1) for x, y in inner_points(idea, POINTS)), *others]
             answers += drawer.drawn(frame, points, hint) + drawer.drawn(frame, points, None)
     if not ideas:
-        answers = drawer.drawn(frame, marked + outside, None)
+        answers = drawer.drawn(frame, [*clicked, *others], None)
+    answers = [each for each in answers if _keeps(each[0], clicked)] or answers
     agree = [float(np.mean([overlap(mask, idea) for idea in ideas])) if ideas else 0.0 for mask, _ in answers]
     best = int(np.argmax([a + SURE * sure for a, (_, sure) in zip(agree, answers, strict=True)]))
     if ideas and agree[best] < AGREE:
         return (guess if guess.any() else coloured), 0.5
     return answers[best]
+
+
+def _keeps(mask: np.ndarray, clicked: list[Point]) -> bool:
+    """Whether an outline has inside and outside what was clicked as such."""
+    return all(mask[round(y), round(x)] == (label == 1) for x, y, label in clicked)
 
 
 def _its_own(rough: np.ndarray, guess: np.ndarray, marked: list[Point]) -> np.ndarray:
