@@ -13,9 +13,9 @@ import numpy as np
 
 from surgisim.config.masking import Click
 from surgisim.perception.masking.drawing import Drawer, Embedded, Point, inner_points, overlap
-from surgisim.perception.masking.remembering import Remembered, belief, remember
+from surgisim.perception.masking.remembering import Asked, Remembered, belief, remember
 
-LAST = 5
+LAST = 3
 """Frames remembered beside those that were clicked."""
 POINTS = 3
 """Points shown to the network of what it is to draw."""
@@ -70,7 +70,8 @@ def _draw(things, t: int, frame: Embedded, rough: np.ndarray, clicks: Sequence[C
     """Masks of every thing in frame t; what is clicked and is none of them yet becomes one."""
     places = frame.places
     known = [thing for thing in things if t not in thing.masks]
-    likely = [belief(places, [*thing.shown, *thing.last], frame.size) for thing in known]
+    asked: Asked = {}
+    likely = [belief(places, [*thing.shown, *thing.last], frame.size, asked) for thing in known]
     marked: list[list[Point]] = [[] for _ in known]
     tissue = [(c.x, c.y, 0) for c in clicks if c.label == "tissue"]
     for click in (c for c in clicks if c.label == "tool"):
