@@ -14,7 +14,7 @@ SIZE, SIDE = (96, 128), 64
 
 
 class OneColour:
-    """Draws, around each point inside, what is of its colour and hangs together; another answer is the whole frame."""
+    """Draws what is of the colour of each point inside, around it; or of the first alone; or the whole frame."""
 
     def __init__(self):
         self.looked_at = 0
@@ -25,13 +25,12 @@ class OneColour:
         return Embedded({"image_embed": small.transpose(2, 0, 1)[None], "frame": frame}, frame.shape[:2])
 
     def drawn(self, frame: Embedded, points, hint):
-        picture, mask = frame.tensors["frame"].astype(int), np.zeros(frame.size, bool)
-        for x, y, label in points:
-            if label == 1:
-                like = (np.abs(picture - picture[round(y), round(x)]).max(-1) < 25).astype(np.uint8)
-                _, region = cv2.connectedComponents(like)
-                mask |= region == region[round(y), round(x)]
-        return [(mask, 0.9), (np.ones(frame.size, bool), 0.1)]
+        picture, regions = frame.tensors["frame"].astype(int), []
+        for x, y, _ in (point for point in points if point[2] == 1):
+            like = (np.abs(picture - picture[round(y), round(x)]).max(-1) < 25).astype(np.uint8)
+            _, region = cv2.connectedComponents(like)
+            regions.append(region == region[round(y), round(x)])
+        return [(np.any(regions, 0), 0.9), (regions[0], 0.8), (np.ones(frame.size, bool), 0.1)]
 
 
 def passing(count=9, second_from=0):
@@ -106,10 +105,13 @@ def test_what_colour_found_comes_in_where_it_hangs_together_with_the_thing():
 
 
 def test_an_outline_that_takes_in_clicked_tissue_is_passed_over():
-    rgb, _ = passing()
-    rgb[4, 40:60, 20:24] = (60, 80, 200)
-    masks, _ = follow(rgb, NOTHING, BLUE, Click(frame=4, x=100, y=90, label="tissue"))
-    assert not masks[4, 90, 100]
+    """Colour takes everything for the instrument, and the network can draw everything."""
+    rgb, tools = passing()
+    astray = NOTHING.copy()
+    astray[4] = True
+    assert follow(rgb, astray, BLUE)[0][4].all()
+    masks, _ = follow(rgb, astray, BLUE, Click(frame=4, x=100, y=90, label="tissue"))
+    assert overlap(masks[4], tools[4, 0]) > 0.95
 
 
 def test_places_that_look_alike_are_believed_to_be_the_same_thing_near_by_or_anywhere():
@@ -135,6 +137,7 @@ def test_points_to_show_lie_inside_and_apart():
     assert all(region[y, x] for x, y in points)
     assert min(np.hypot(a[0] - b[0], a[1] - b[1]) for a in points for b in points if a != b) > 10
     assert not inner_points(np.zeros((9, 9), bool), 2)
+    assert inner_points(np.ones((9, 12), bool), 2)
 
 
 @pytest.mark.slow

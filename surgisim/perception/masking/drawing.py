@@ -114,7 +114,8 @@ def inner_points(region: np.ndarray, count: int) -> list[tuple[float, float]]:
         if thick < 1:
             break
         places.append((x, y))
-        cv2.circle(distance, (x, y), max(int(3 * thick), 2), 0, -1)
+        # Where all is inside, nothing bounds the distance.
+        cv2.circle(distance, (x, y), max(int(min(3 * thick, max(region.shape))), 2), 0, -1)
     return places
 
 
