@@ -109,7 +109,7 @@ def test_an_outline_that_takes_in_clicked_tissue_is_passed_over():
     rgb, tools = passing()
     astray = NOTHING.copy()
     astray[4] = True
-    assert follow(rgb, astray, BLUE)[0][4].all()
+    assert follow(rgb, astray, BLUE)[0][4, 90, 100]
     masks, _ = follow(rgb, astray, BLUE, Click(frame=4, x=100, y=90, label="tissue"))
     assert overlap(masks[4], tools[4, 0]) > 0.95
 
