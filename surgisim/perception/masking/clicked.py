@@ -22,7 +22,7 @@ POINTS = 3
 LEAST = 0.0004
 """Share of the frame below which nothing is there to be drawn."""
 AGREE = 0.4
-"""Overlap with where it is thought to be from which an outline is believed."""
+"""Overlap with where it is thought to be from which an outline is believed in frames that were not clicked."""
 SURE = 0.5
 """What the network's own estimate counts beside the overlap."""
 
@@ -123,7 +123,7 @@ def _best(
     answers = [each for each in answers if _keeps(each[0], clicked)] or answers
     agree = [float(np.mean([overlap(mask, idea) for idea in ideas])) if ideas else 0.0 for mask, _ in answers]
     best = int(np.argmax([a + SURE * sure for a, (_, sure) in zip(agree, answers, strict=True)]))
-    if ideas and agree[best] < AGREE:
+    if ideas and agree[best] < AGREE and not clicked:
         return (guess if guess.any() else coloured), 0.5
     return answers[best]
 
