@@ -18,9 +18,10 @@ from surgisim.config.base import parse
 from surgisim.config.whole import Whole, is_path
 from surgisim.launch import home
 from surgisim.order import chosen
+from surgisim.perception.optical_flow.choice import AUTO
 from surgisim.problem import Problem
 from surgisim.side_by_side import together
-from surgisim.weights import KINDS, found
+from surgisim.weights import KINDS, Kind, found
 
 GIB = 2**30
 PACKAGES = ("surgisim", "snakemake", "numpy", "numba", "torch", "warp-lang", "opencv-python-headless", "av")
@@ -40,7 +41,13 @@ def examine(configs: tuple[Path, ...]) -> None:
     console = Console(highlight=False, soft_wrap=True)
     settings = parse(Whole, chosen(configs, ()), "config")
     there = found(settings.weights) if settings.weights else {}
-    for name, what, means in (*_machine(), *_accelerators(), *_software(), *_weights(settings, there)):
+    for name, what, means in (
+        *_machine(),
+        *_accelerators(),
+        *_software(),
+        *_weights(settings, there),
+        *_used(settings, there),
+    ):
         console.print(f"[bold]{name:24s}[/] {escape(what)}{f'  ({escape(means)})' if means else ''}")
 
 
@@ -131,8 +138,32 @@ def _weights(settings: BaseModel, there: Mapping[str, Path], prefix: str = "") -
 
 def _with(key: str) -> str:
     kind = next(kind for kind in KINDS if kind.setting == key)
-    where = f"; asked for by {key.split('.')[0]}.backend: {kind.backend}" if kind.backend else ""
-    return f"brings {kind.brings}{where}"
+    return f"brings {kind.brings}{_asks(kind)}"
+
+
+def _asks(kind: Kind) -> str:
+    if kind.asked_by is None:
+        return ""
+    stage, (key, choice) = kind.setting.split(".")[0], kind.asked_by
+    also = f", and by auto with {stage}.{kind.auto_with}" if kind.auto_with else ""
+    return f"; asked for by {stage}.{key}: {choice}{also}"
+
+
+def _used(settings: Any, there: Mapping[str, Path]) -> Iterator[Row]:
+    """What the settings' choices come to with the weights that are there."""
+    masking = settings.masking
+    lacks = [k for k in ("encoder", "decoder") if not (getattr(masking, k) or f"masking.{k}" in there)]
+    if masking.backend != "auto":
+        yield "masking uses", masking.backend, ""
+    elif lacks:
+        yield "masking uses", "colour_motion", f"given masks go before; sam2 lacks its {' and '.join(lacks)}"
+    elif any(click.label == "tool" for click in masking.clicks):
+        yield "masking uses", "sam2", "given masks go before"
+    else:
+        yield "masking uses", "colour_motion", "given masks go before; sam2 where instruments are clicked"
+    for stage in ("correspondence", "inpainting"):
+        name = getattr(settings, stage).flow
+        yield f"{stage} uses", AUTO if name == "auto" else name, "optical flow"
 
 
 def _without(key: str) -> str:

@@ -19,16 +19,39 @@ class Kind:
     pattern: str
     """Names that it has, as globs; a folder's too."""
     brings: str
-    backend: str | None
-    """Backend of the stage that reads it; none where it is read whenever it is there."""
+    asked_by: tuple[str, str] | None
+    """Key of the stage's settings that asks for it, and the choice that does; none where it is read whenever it is
+    there."""
+    auto_with: str | None = None
+    """Key of the stage's settings with which `auto` asks for it, too: what docs/benchmarks/learned.md shows better."""
 
 
+SAM2 = ("backend", "sam2")
 KINDS = (
-    Kind("masking.encoder", "sam2*encoder*.onnx", "outlines of instruments with its decoder", "sam2"),
-    Kind("masking.decoder", "sam2*decoder*.onnx", "outlines of instruments with its encoder", "sam2"),
-    Kind("inpainting.weights", "inpaint*", "what instruments hide, painted by a network", "network"),
-    Kind("depth.weights", "depth_anything*", "depth of single frames by a network", "depth_anything"),
-    Kind("tracking.weights", "cotracker*.pt", "tissue points through a clip followed by a network", "cotracker"),
+    Kind(
+        "masking.encoder",
+        "sam2*encoder*.onnx",
+        "outlines of instruments, with its decoder",
+        ("backend", "sam2"),
+        "clicks",
+    ),
+    Kind(
+        "masking.decoder",
+        "sam2*decoder*.onnx",
+        "outlines of instruments, with its encoder",
+        ("backend", "sam2"),
+        "clicks",
+    ),
+    Kind("inpainting.flow_weights", "raft*.safetensors", "optical flow behind instruments by RAFT", ("flow", "raft")),
+    Kind("inpainting.weights", "inpaint*", "what instruments hide, painted by a network", ("backend", "network")),
+    Kind("correspondence.flow_weights", "raft*.safetensors", "tissue that went far found by RAFT", ("flow", "raft")),
+    Kind("depth.weights", "depth_anything*", "depth of single frames by a network", ("backend", "depth_anything")),
+    Kind(
+        "tracking.weights",
+        "cotracker*.pt",
+        "tissue points through a clip followed by a network",
+        ("backend", "cotracker"),
+    ),
     Kind("evaluation.lpips_weights", "lpips*.safetensors", "LPIPS beside PSNR and SSIM in reports and tables", None),
 )
 
@@ -56,6 +79,14 @@ def filled(raw: Mapping[str, Any], there: Mapping[str, Path]) -> dict[str, Any]:
     for kind in KINDS:
         stage, key = kind.setting.split(".")
         own = result.get(stage) or {}
-        if kind.setting in there and not own.get(key) and kind.backend in (None, own.get("backend")):
+        if kind.setting in there and not own.get(key) and _is_asked_for(kind, own):
             result[stage] = {**own, key: str(there[kind.setting])}
     return result
+
+
+def _is_asked_for(kind: Kind, own: Mapping[str, Any]) -> bool:
+    if kind.asked_by is None:
+        return True
+    key, choice = kind.asked_by
+    told = own.get(key, "auto" if kind.auto_with else None)
+    return told == choice or bool(told == "auto" and kind.auto_with and own.get(kind.auto_with))

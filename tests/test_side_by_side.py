@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from surgisim import side_by_side
-from surgisim.perception.flow import dense_flow
+from surgisim.perception.optical_flow.dis import dense_flow
 from surgisim.side_by_side import in_order, openmp, together
 
 

@@ -16,5 +16,10 @@ class Inpainting(Settings):
     of the longest side [px]."""
     reach: Annotated[int, Field(ge=1)] = 400
     """Farthest frame a pixel may be copied from [frames]."""
+    flow: str = "auto"
+    """Optical flow by which frames are followed: dis needs no weights. A file of surgisim/perception/optical_flow;
+    auto takes dis (docs/benchmarks/learned.md) [name]."""
+    flow_weights: Path | None = None
+    """raft: its weights, a safetensors file [path]."""
     weights: Path | None = None
     """The network for the backend network, TorchScript (.pt) or ONNX (.onnx) [path]."""

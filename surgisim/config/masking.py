@@ -23,10 +23,12 @@ class Click(Settings):
 
 class Masking(Settings):
     backend: str = "auto"
-    """auto takes masks that came with the recording and else colour_motion; or a file of
+    """auto takes masks that came with the recording; else sam2 where an instrument is clicked and its two files are
+    there, which draws closer outlines then (docs/benchmarks/learned.md); else colour_motion. Or a file of
     surgisim/perception/masking: colour_motion, given, sam2 [name]."""
     clicks: list[Click] = []
-    """Points the user marked as tool or tissue [list]."""
+    """Points the user marked as tool or tissue; sam2 follows what is marked once for each instrument, in any frame
+    [list]."""
     require_tool: bool = False
     """Whether a clip in which no instrument is found is refused [yes/no]."""
     margin: Annotated[int, Field(ge=0)] | None = None

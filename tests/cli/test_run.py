@@ -225,7 +225,7 @@ def test_two_runs_at_once_in_one_folder_are_refused(tree):
 def test_doctor_and_terms_answer(tree):
     looked = tree.surgisim("doctor")
     assert looked.returncode == 0
-    for thing in ("processor", "memory", "GPU", "torch", "warp", "evaluation.lpips_weights"):
+    for thing in ("processor", "memory", "GPU", "torch", "warp", "evaluation.lpips_weights", "masking uses"):
         assert thing in looked.stdout
     laws = tree.surgisim("terms").stdout
     for law in Path(tree.root / "surgisim" / "physics" / "terms").glob("[a-z]*.py"):

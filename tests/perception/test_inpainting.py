@@ -1,8 +1,11 @@
 """What the instrument hides is taken from frames that saw it, and only what none saw is invented."""
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
+from onnx_file import write
 from recordings import H, W, operated, silent, tissue
 
 from surgisim.artifacts.frames import Frames
@@ -170,6 +173,44 @@ def test_a_network_fills_only_what_no_frame_saw(tmp_path):
     assert invented.any()
     assert (np.abs(result.rgb[invented].astype(int) - [0, 255, 0]) <= 1).mean() > 0.98
     assert np.array_equal(result.rgb[result.origin == SEEN], rgb[result.origin == SEEN])
+
+
+@pytest.mark.parametrize("side", ["any", 64])
+def test_a_network_as_onnx_fills_the_same_at_any_size_and_at_its_only_one(tmp_path, side):
+    pytest.importorskip("onnxruntime")
+    height, width = ("h", "w") if side == "any" else (side, side)
+    green = write(
+        tmp_path / "green.onnx",
+        {"image": (1, 3, height, width), "hole": (1, 1, height, width)},
+        [
+            ("Sub", ["one", "hole"], "seen", {}),
+            ("Mul", ["image", "seen"], "kept", {}),
+            ("Mul", ["hole", "green"], "new", {}),
+            ("Add", ["kept", "new"], "filled", {}),
+        ],
+        {"filled": (1, 3, height, width)},
+        one=np.ones((1, 1, 1, 1)),
+        green=np.array([0, 1, 0]).reshape(1, 3, 1, 1),
+    )
+    rgb, tool = operated(4, (H + 1, W + 3), shift=0.0)
+    result = filled(rgb, tool, backend="network", weights=green)
+    invented = result.origin == INVENTED
+    assert (np.abs(result.rgb[invented].astype(int) - [0, 255, 0]).max(-1) <= 60).mean() > 0.9
+    assert np.array_equal(result.rgb[result.origin == SEEN], rgb[result.origin == SEEN])
+
+
+@pytest.mark.parametrize("flow", ["dis", "raft"])
+def test_the_flow_that_is_chosen_is_asked(flow, monkeypatch):
+    rgb, tool, _ = passing(4)
+    asked = []
+
+    def prepared(weights):
+        asked.append(weights)
+        return lambda a, b: np.zeros((*a.shape[:2], 2), np.float32)
+
+    monkeypatch.setattr(f"surgisim.perception.optical_flow.{flow}.prepared", prepared)
+    filled(rgb, tool, flow=flow, flow_weights="raft.safetensors")
+    assert asked == [Path("raft.safetensors")]
 
 
 def test_masks_of_another_clip_are_refused():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from onnx_file import write
 from recordings import H, W, operated, silent, tissue
 
 from surgisim.artifacts.camera import Camera
@@ -173,6 +174,59 @@ def test_weights_that_are_no_network_are_refused(tmp_path):
     rgb, _ = operated(3, (H, W))
     with pytest.raises(Problem, match="cannot be loaded as SAM 2"):
         masked(rgb, backend="sam2", encoder=tmp_path / "encoder.onnx", decoder=tmp_path / "decoder.onnx")
+
+
+@pytest.fixture(scope="module")
+def tiny_sam2(tmp_path_factory):
+    """Networks of SAM 2's form that draw what is bluer than red, sure of that, or everything, or nothing."""
+    pytest.importorskip("onnxruntime")
+    folder, pools = tmp_path_factory.mktemp("sam2"), {"image_embed": 16, "high_res_feats_0": 4, "high_res_feats_1": 8}
+    encoder = write(
+        folder / "encoder.onnx",
+        {"image": (1, 3, 1024, 1024)},
+        [
+            ("AveragePool", ["image"], name, {"kernel_shape": [by, by], "strides": [by, by]})
+            for name, by in pools.items()
+        ],
+        {name: (1, 3, 1024 // by, 1024 // by) for name, by in pools.items()},
+    )
+    shown = {"point_coords": (1, "n", 2), "point_labels": (1, "n"), "mask_input": (1, 1, 256, 256)}
+    decoder = write(
+        folder / "decoder.onnx",
+        {name: (1, 3, 1024 // by, 1024 // by) for name, by in pools.items()} | shown | {"has_mask_input": (1,)},
+        [("Conv", ["high_res_feats_0", "blue", "all_or_nothing"], "masks", {}), ("Add", ["sure", "none"], "iou", {})],
+        {"masks": (1, 3, 256, 256), "iou": (1, 3)},
+        blue=np.array([[-1, 0, 1], [0, 0, 0], [0, 0, 0]]).reshape(3, 3, 1, 1),
+        all_or_nothing=np.array([0, 5, -5]),
+        sure=np.array([[0.9, 0.5, 0.5]]),
+        none=np.zeros((1, 3)),
+    )
+    return {"encoder": encoder, "decoder": decoder}
+
+
+def test_sam2_draws_what_colour_motion_found_and_follows_what_is_clicked(tiny_sam2):
+    rgb, tool = operated(5, SIZE)
+    blue = np.where(tool[..., None], np.array([60, 90, 230], np.uint8), rgb)
+    row, column = (int(v.mean()) for v in np.nonzero(tool[2]))
+    for clicks in ([], [Click(frame=2, x=column, y=row)]):
+        found = masked(blue, backend="sam2", clicks=clicks, **tiny_sam2)
+        assert overlap(found.tool, tool) > 0.9
+        assert np.allclose(found.confidence, 0.9)
+
+
+def test_auto_takes_sam2_where_an_instrument_is_clicked_and_its_files_are_named(tiny_sam2):
+    rgb, tool = operated(4, SIZE)
+    row, column = (int(v.mean()) for v in np.nonzero(tool[2]))
+    click, tissue_click = Click(frame=2, x=column, y=row), Click(frame=2, x=3, y=90, label="tissue")
+    for clicks, files, name in (
+        ([click], tiny_sam2, "sam2"),
+        ([click], {"encoder": tiny_sam2["encoder"]}, "colour_motion"),
+        ([tissue_click], tiny_sam2, "colour_motion"),
+        ([], tiny_sam2, "colour_motion"),
+    ):
+        said = []
+        masked(rgb, said=said, clicks=clicks, **files)
+        assert f"({name})" in said[-1]
 
 
 def test_masking_twice_gives_the_same_bytes():

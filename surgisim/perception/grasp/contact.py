@@ -5,7 +5,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from surgisim.perception.flow import dense_flow
+from surgisim.perception.optical_flow.dis import dense_flow
 from surgisim.side_by_side import in_order
 
 

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from surgisim.artifacts.frames import AFTER, BETWEEN, USED
-from surgisim.perception.flow import dense_flow
+from surgisim.perception.optical_flow.dis import dense_flow
 
 THUMBNAIL = 160
 """Width at which frames are compared [px]."""

@@ -14,9 +14,10 @@ import numpy as np
 
 from surgisim.artifacts.inpainted import COPIED, INVENTED, SEEN
 from surgisim.config.inpainting import Inpainting
-from surgisim.perception.flow import dense_flow
 from surgisim.perception.inpainting.smooth import continued
 from surgisim.perception.inpainting.source import Source, behind, followed, seen
+from surgisim.perception.optical_flow import Flow
+from surgisim.perception.optical_flow.choice import chosen
 from surgisim.perception.tracking.between import sample
 from surgisim.side_by_side import in_order
 
@@ -35,7 +36,8 @@ def fill(rgb: np.ndarray, hole: np.ndarray, settings: Inpainting, progress) -> t
 def fill_with(rgb, hole, settings: Inpainting, progress, *, invent: Invent) -> tuple[np.ndarray, np.ndarray]:
     """As `fill`, with `invent(frame, hole) -> frame` for what no frame saw."""
     total = len(rgb)
-    to_next, to_last = _tissue_motion(rgb, hole, progress)
+    flow = chosen(settings.flow, settings.flow_weights, stage="inpainting")
+    to_next, to_last = _tissue_motion(rgb, hole, flow, progress)
     earlier, later = in_order(_swept, ((range(total), to_last, hole), (range(total - 1, -1, -1), to_next, hole)))
     filled, known = rgb.copy(), ~hole
 
@@ -82,13 +84,13 @@ def _near_rim(hole: np.ndarray) -> np.ndarray:
     return np.clip(1 - away, 0, 1)
 
 
-def _tissue_motion(rgb, hole, progress) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def _tissue_motion(rgb, hole, flow: Flow, progress) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Flow of the tissue t -> t + 1 (last entry unused) and t -> t - 1 (first unused)."""
     still = np.zeros((*rgb.shape[1:3], 2), np.float32)
     # The instrument is smoothed away first: its edges would drag the flow of the tissue beside it along.
     veiled = in_order(_veiled, zip(rgb, hole, strict=True))
     to_next, to_last = [], [still]
-    pairs = ((*frames, *holes) for frames, holes in zip(pairwise(veiled), pairwise(hole), strict=True))
+    pairs = ((flow, *frames, *holes) for frames, holes in zip(pairwise(veiled), pairwise(hole), strict=True))
     for t, (on, back) in enumerate(in_order(_between, pairs)):
         progress(len(rgb) * 0.5 * t / len(rgb), len(rgb), "following the tissue")
         to_next.append(on)
@@ -100,9 +102,9 @@ def _veiled(frame: np.ndarray, hole: np.ndarray) -> np.ndarray:
     return np.rint(continued(frame.astype(np.float32), ~hole)).clip(0, 255).astype(np.uint8)
 
 
-def _between(one, other, hole_one, hole_other) -> tuple[np.ndarray, np.ndarray]:
+def _between(flow: Flow, one, other, hole_one, hole_other) -> tuple[np.ndarray, np.ndarray]:
     """Flow of the tissue from one frame to another, and back."""
-    there, back = dense_flow(one, other), dense_flow(other, one)
+    there, back = flow(one, other), flow(other, one)
     return behind(there, back, hole_one, hole_other), behind(back, there, hole_other, hole_one)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from surgisim.config.inpainting import Inpainting
 from surgisim.perception.inpainting.flow_copy import fill_with
 from surgisim.perception.inpainting.smooth import continued
+from surgisim.perception.torchscript import torchscript
 from surgisim.problem import Problem
 
 MULTIPLE = 8
@@ -45,11 +46,9 @@ def _loaded(path: Path | None) -> tuple[Model, tuple[int, int] | None]:
 def _torchscript(path: Path) -> Model:
     import torch
 
-    try:
-        model = torch.jit.load(str(path), map_location="cpu").eval()
-    except RuntimeError as error:
-        first = str(error).strip().splitlines()[0]
-        raise Problem(f"{path}: cannot be loaded as TorchScript ({first}). Export it with torch.jit.save.") from error
+    model = torchscript(
+        path, export="Export the network with torch.jit.save, or use inpainting.backend: flow_copy, which needs none."
+    )
 
     def run(image: np.ndarray, gap: np.ndarray) -> np.ndarray:
         with torch.inference_mode():

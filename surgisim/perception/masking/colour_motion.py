@@ -15,10 +15,11 @@ from skimage.filters import threshold_otsu
 from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.given import Given
 from surgisim.config.masking import Masking
-from surgisim.perception.flow import agrees, carry, dense_flow
+from surgisim.perception.flow import agrees, carry
 from surgisim.perception.masking.appearance import OFFSET, features, highlights, lit
 from surgisim.perception.masking.settling import settled
 from surgisim.perception.masking.shape import bridged, entering, snapped, solid
+from surgisim.perception.optical_flow.dis import dense_flow
 from surgisim.side_by_side import in_order
 
 BINS = 24

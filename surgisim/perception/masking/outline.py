@@ -17,6 +17,8 @@ from surgisim.perception import masking
 from surgisim.perception.masking.appearance import lit, specular
 from surgisim.problem import Problem
 
+PARTS = {"appearance", "clicked", "drawing", "outline", "remembering", "settling", "shape"}
+"""Files of this room that are no backend."""
 Progress = Callable[[float, float, str], None]
 
 
@@ -25,7 +27,7 @@ def masks(frames: Frames, given: Given, camera: Camera, settings: Masking, *, pr
     settings = _with_working_clicks(settings, camera)
     name = settings.backend
     if name == "auto":
-        name = "given" if len(given.tool) else "colour_motion"
+        name = "given" if len(given.tool) else automatic(settings)
     tool, confidence = _backend(name)(frames, given, settings, progress)
     _say_what_was_found(tool, confidence, name, settings, progress)
     margin = round(0.006 * max(tool.shape[1:])) if settings.margin is None else settings.margin
@@ -33,9 +35,17 @@ def masks(frames: Frames, given: Given, camera: Camera, settings: Masking, *, pr
     return Masks(tool, lit(frames.rgb) & ~around, specular(frames.rgb, tool), confidence.astype(np.float32))
 
 
+def automatic(settings: Masking) -> str:
+    """What `auto` takes where no masks came with the recording: SAM 2 needs clicks to be the better one."""
+    shown = any(click.label == "tool" for click in settings.clicks)
+    return "sam2" if shown and settings.encoder and settings.decoder else "colour_motion"
+
+
 def _backend(name: str) -> Callable:
     files = [m.name for m in pkgutil.iter_modules(masking.__path__)]
-    known = [f for f in files if f not in ("appearance", "outline", "settling", "shape")]
+    known = [
+        f for f in files if f not in ("appearance", "clicked", "drawing", "outline", "remembering", "settling", "shape")
+    ]
     if name not in known:
         raise Problem(
             f"config key 'masking.backend' is '{name}', and surgisim/perception/masking/ holds {sorted(known)}. "

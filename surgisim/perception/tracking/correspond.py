@@ -10,6 +10,9 @@ from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.masks import Masks
 from surgisim.config import correspondence as config
 from surgisim.perception.flow import pixel_grid
+from surgisim.perception.optical_flow import Flow
+from surgisim.perception.optical_flow.choice import chosen
+from surgisim.perception.optical_flow.dis import dense_flow
 from surgisim.perception.tracking.warp import follow_surface
 from surgisim.problem import Problem
 
@@ -28,20 +31,28 @@ def correspond(
             f"correspondence: masks are {masks.tool.shape} and frames {rgb.shape[:3]}; pass files of one clip and size."
         )
     by = max(1, round(settings.margin * max(rgb.shape[1:3])))
-    return between(rgb, np.stack([widen(mask, by) for mask in masks.tool]), progress=progress)
+    flow = chosen(settings.flow, settings.flow_weights, stage="correspondence")
+    hidden = np.stack([widen(mask, by) for mask in masks.tool])
+    # The frames' own steps are short, where DIS is the better one: docs/benchmarks/learned.md.
+    return between(rgb, hidden, far=None if flow is dense_flow else flow, progress=progress)
 
 
 def between(
-    rgb: np.ndarray, hidden: np.ndarray, *, progress: Callable[[float, float, str], None] | None = None
+    rgb: np.ndarray,
+    hidden: np.ndarray,
+    *,
+    far: Flow | None = None,
+    progress: Callable[[float, float, str], None] | None = None,
 ) -> Correspondence:
     """Between frame 0 and every frame.
 
-    rgb: sRGB, (T, H, W, 3) uint8. hidden: pixels that do not show the surface, (T, H, W) bool.
+    rgb: sRGB, (T, H, W, 3) uint8. hidden: pixels that do not show the surface, (T, H, W) bool. far: flow to look for
+    the surface by straight from frame 0, too.
     """
     moved = np.empty((*hidden.shape, 2), np.float16)
     seen, error = np.empty(hidden.shape, bool), np.empty(hidden.shape, np.float16)
     grid = pixel_grid(*hidden.shape[1:])
-    for t, warp in enumerate(follow_surface(rgb, hidden, progress=progress)):
+    for t, warp in enumerate(follow_surface(rgb, hidden, far=far, progress=progress)):
         moved[t], seen[t], error[t] = warp.position - grid, warp.seen, warp.error
     return Correspondence(moved, seen, error, hidden)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from surgisim.artifacts.correspondence import Correspondence
 from surgisim.config.tracking import Tracking
+from surgisim.perception.torchscript import torchscript
 from surgisim.perception.tracking import Paths
 from surgisim.problem import Problem
 
@@ -58,13 +59,8 @@ def track(
 
 
 def _load(weights: Path | None):
-    import torch
-
     if weights is None:
         raise Problem(f"tracking: backend 'cotracker' needs the setting tracking.weights. {ELSEWHERE}")
     if not weights.is_file():
         raise Problem(f"tracking: backend 'cotracker' looks for {weights}, and there is no such file. {ELSEWHERE}")
-    try:
-        return torch.jit.load(str(weights), map_location="cpu").eval()
-    except RuntimeError as error:
-        raise Problem(f"tracking: {weights} is not a TorchScript file. {ELSEWHERE}") from error
+    return torchscript(weights, export=ELSEWHERE)

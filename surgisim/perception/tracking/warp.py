@@ -2,7 +2,8 @@
 
 From frame to frame by dense flow, and again and again straight from the first frame: each frame is pulled back
 to the first by what is known so far, and the flow that remains is the drift to take out. Behind an instrument the
-surface is guessed from its surroundings, until it is found again.
+surface is guessed from its surroundings, until it is found again. A flow that finds what went far is asked straight
+from the first frame to each, too, where there is one.
 """
 
 from collections.abc import Callable, Iterator
@@ -11,7 +12,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from surgisim.perception.flow import carry, dense_flow, pixel_grid, round_trip
+from surgisim.perception.flow import carry, pixel_grid, round_trip
+from surgisim.perception.optical_flow import Flow
+from surgisim.perception.optical_flow.dis import dense_flow
 from surgisim.perception.tracking.spread import spread
 from surgisim.side_by_side import in_order
 
@@ -52,20 +55,26 @@ class _Found:
 
 
 def follow_surface(
-    rgb: np.ndarray, hidden: np.ndarray, *, progress: Callable[[float, float, str], None] | None = None
+    rgb: np.ndarray,
+    hidden: np.ndarray,
+    *,
+    far: Flow | None = None,
+    progress: Callable[[float, float, str], None] | None = None,
 ) -> Iterator[Warp]:
     """One Warp a frame, the first being the identity.
 
-    rgb: sRGB, (T, H, W, 3) uint8. hidden: pixels that do not show the surface, (T, H, W) bool.
+    rgb: sRGB, (T, H, W, 3) uint8. hidden: pixels that do not show the surface, (T, H, W) bool. far: flow to look for
+    the surface by in each frame straight from the first.
     """
     grid = pixel_grid(*rgb.shape[1:3])
     grey = list(in_order(flat_light, zip(rgb)))
     now = Warp(grid.copy(), ~hidden[0], np.full(grid.shape[:2], 0.1, np.float32))
     yield now
 
-    def beforehand(t: int) -> tuple[tuple[np.ndarray, np.ndarray], _Found]:
+    def beforehand(t: int) -> tuple[tuple[np.ndarray, np.ndarray], list[_Found]]:
         both = dense_flow(grey[t - 1], grey[t]), dense_flow(grey[t], grey[t - 1])
-        return both, _found(grid, grey[0], grey[t], hidden[0], hidden[t])
+        starts = [grid] if far is None else [grid, grid + far(rgb[0], rgb[t])]
+        return both, [_found(start, grey[0], grey[t], hidden[0], hidden[t]) for start in starts]
 
     for t, known in enumerate(in_order(beforehand, zip(range(1, len(rgb)))), 1):
         now = _advance(now, *known, grey[0], grey[t], hidden[0], hidden[t - 1], hidden[t])
@@ -95,11 +104,11 @@ def likeness(a: np.ndarray, b: np.ndarray, weight: np.ndarray, *, radius: float 
     return (mean(a * b) - ma * mb) / np.sqrt(np.maximum(va, 1.0) * np.maximum(vb, 1.0))
 
 
-def _advance(before: Warp, both, from_rest: _Found, first, new, hidden_first, hidden_last, hidden_new) -> Warp:
-    """both: flow from the frame before and back to it. from_rest: see `_anchor`."""
+def _advance(before: Warp, both, from_first: list[_Found], first, new, hidden_first, hidden_last, hidden_new) -> Warp:
+    """both: flow from the frame before and back to it. from_first: see `_anchor`."""
     grid = pixel_grid(*first.shape)
     guess, chained, step_error = _chain(before, *both, hidden_last, hidden_new)
-    position, anchored, anchor_error, like = _anchor(guess, from_rest, first, new, hidden_first, hidden_new, before)
+    position, anchored, anchor_error, like = _anchor(guess, from_first, first, new, hidden_first, hidden_new, before)
     strange = 1.5 * np.clip(RECOGNISED - like, 0.0, 1.0)
     error = np.where(anchored, anchor_error, np.sqrt(before.error**2 + step_error**2 + strange**2))
     seen = (anchored | chained) & _shown(position, hidden_new) & ~hidden_first & (error < LOST)
@@ -123,16 +132,17 @@ def _chain(before: Warp, there, back, hidden_last, hidden_new):
     return before.position + step, tells, 0.1 + 0.5 * loop
 
 
-def _anchor(guess, from_rest: _Found, first, new, hidden_first, hidden_new, before):
+def _anchor(guess, from_first: list[_Found], first, new, hidden_first, hidden_new, before):
     """The guess less its drift against the first frame, where the first frame's texture is recognised.
 
-    Tried from the guess, from what that gave, and from rest, where tissue that is let go returns to.
+    Tried from the guess, from what that gave, and from what asks the first frame alone: rest, where tissue that is let
+    go returns to, and the flow that finds what went far.
     """
     grid = pixel_grid(*first.shape)
     best, good, error = guess, np.zeros(first.shape, bool), before.error
     like, far = np.full(first.shape, RECOGNISED, np.float32), 0.15 * max(first.shape)
-    for attempt in range(3):
-        found = from_rest if attempt == 2 else _found(best, first, new, hidden_first, hidden_new)
+    for attempt in range(2 + len(from_first)):
+        found = from_first[attempt - 2] if attempt > 1 else _found(best, first, new, hidden_first, hidden_new)
         if attempt == 0:
             unmoved = likeness(first, found.pulled, found.usable)
         away = np.linalg.norm(found.there - guess, axis=-1)
