@@ -151,10 +151,10 @@ def test_sam2_follows_the_instruments_of_the_pulling_clip_from_one_click_each(sh
     from surgisim.perception.masking.outline import masks
     from surgisim.proof.learned.outlines import beside
 
-    frames, _, given = ingest(shared / "data/endonerf_pulling", Ingest(end=0.6), progress=silent)
+    frames, camera, given = ingest(shared / "data/endonerf_pulling", Ingest(end=0.6), progress=silent)
     files = {which: shared / f"weights/sam2_hiera_tiny_{which}_w8.onnx" for which in ("encoder", "decoder")}
-    clicks = [Click(frame=12, x=37, y=119), Click(frame=12, x=303, y=176)]
+    clicks = [Click(frame=12, x=74.5, y=238.5), Click(frame=12, x=606.5, y=352.5)]
     settings = Masking(backend="sam2", clicks=clicks, **files)
-    told = beside(masks(frames, given, settings, progress=silent).tool, given.tool, 12)
+    told = beside(masks(frames, given, camera, settings, progress=silent).tool, given.tool, 12)
     assert told["inside_given"]["min"] > 0.97
     assert told["overlap_widened"]["mean"] > 0.9

@@ -24,7 +24,7 @@ Progress = Callable[[float, float, str], None]
 
 def masks(frames: Frames, given: Given, camera: Camera, settings: Masking, *, progress: Progress) -> Masks:
     """Instrument by the chosen backend; tissue is what is lit, at some distance from it."""
-    settings = _with_working_clicks(settings, camera)
+    settings = with_working_clicks(settings, camera)
     name = settings.backend
     if name == "auto":
         name = "given" if len(given.tool) else automatic(settings)
@@ -43,9 +43,7 @@ def automatic(settings: Masking) -> str:
 
 def _backend(name: str) -> Callable:
     files = [m.name for m in pkgutil.iter_modules(masking.__path__)]
-    known = [
-        f for f in files if f not in ("appearance", "clicked", "drawing", "outline", "remembering", "settling", "shape")
-    ]
+    known = [f for f in files if f not in PARTS]
     if name not in known:
         raise Problem(
             f"config key 'masking.backend' is '{name}', and surgisim/perception/masking/ holds {sorted(known)}. "
@@ -54,7 +52,7 @@ def _backend(name: str) -> Callable:
     return importlib.import_module(f"{masking.__name__}.{name}").tool
 
 
-def _with_working_clicks(settings: Masking, camera: Camera) -> Masking:
+def with_working_clicks(settings: Masking, camera: Camera) -> Masking:
     """The same with clicks in working pixels. Raises Problem for one outside of the clip."""
     clicks = []
     for click in settings.clicks:

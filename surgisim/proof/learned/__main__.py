@@ -21,6 +21,7 @@ from surgisim.config.base import parse
 from surgisim.config.ingest import Ingest
 from surgisim.config.masking import Masking
 from surgisim.perception.ingest.clip import ingest
+from surgisim.perception.masking.outline import with_working_clicks
 from surgisim.perception.optical_flow.choice import chosen
 from surgisim.problem import Problem
 from surgisim.proof.learned import motion, outlines
@@ -41,7 +42,7 @@ def measured(name: str, clip: dict[str, Any], there: dict[str, Path]) -> tuple[d
         Path(clip["path"]), parse(Ingest, clip.get("ingest", {}), name), progress=lambda *_: None
     )
     files = {key.split(".")[1]: there[key] for key in WANTED[:2]}
-    settings = parse(Masking, {"clicks": clip["clicks"], **files}, name)
+    settings = with_working_clicks(parse(Masking, {"clicks": clip["clicks"], **files}, name), camera)
     masks, told = outlines.masks(frames, given, settings)
     said(json.dumps(told))
     shown = ({"given": given.tool} if len(given.tool) else {}) | masks
