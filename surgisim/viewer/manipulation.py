@@ -21,6 +21,7 @@ from surgisim.gaussians.rim import beyond
 from surgisim.mpm.cut import Cut
 from surgisim.mpm.setup import checked_per_frame, theta_of
 from surgisim.mpm.simulator import Simulator, State
+from surgisim.physics.catalogue import choose
 from surgisim.problem import Problem
 from surgisim.simulation.operation import GRIP, Plan
 from surgisim.simulation.setup import bodies, boundary, held_at_rim
@@ -59,6 +60,7 @@ class Manipulation:
         law, material = physics or (case.physics, case.material)
         if law.form != "total":
             raise Problem("view: the paper's updated form has no run by hand. Fit with estimation.form: total.")
+        _refuse_clocks(law)
         task = held_at_rim(Plan(_still(grasps), np.zeros((2, 3)), cut, 0), case.motion)
         made = bodies(case.body, [case.scene, beyond(case.scene, case.camera)], law, task, device)
         self.theta, self.simulator = theta_of(law, material), made[0].simulator
@@ -166,6 +168,21 @@ class Manipulation:
             path[grips] = np.moveaxis(way, 1, 0)
             hold[grips] = (self._holds[k] & self._holds[k + 1])[:, None]
         return path, hold
+
+
+def _refuse_clocks(law: Physics) -> None:
+    """Raise Problem for a law that acts by the recording's clock: by hand there is none."""
+    terms = choose(tuple(law.terms))
+    timed = [
+        name
+        for name, term in terms.items()
+        if "phase" in term.params or (not term.memory and any(p.unit == "s" for p in term.params.values()))
+    ]
+    if timed:
+        raise Problem(
+            f"view: {', '.join(timed)} acts at times of the recording, which a run by hand does not have. Choose the "
+            "body 'fitted', or repeat an exported operation by command."
+        )
 
 
 def _still(grasps: tuple[Grasp, ...]) -> Motion:

@@ -1,6 +1,7 @@
 """What is done by hand is what a replay of the exported operation does."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from cases import CAMERA, quiet
 from surgisim.config.simulation import Simulation
 from surgisim.mpm.carried import Carried
 from surgisim.mpm.cut import Cut
+from surgisim.mpm.setup import prepare, values_of
+from surgisim.physics.catalogue import choose, columns
 from surgisim.problem import Problem
 from surgisim.simulation.replay import replay
 from surgisim.viewer.manipulation import Grasp, Manipulation, under
@@ -74,3 +77,25 @@ def test_a_ray_meets_the_tissue_that_is_nearest_along_it(case):
     assert case.body.surface[hit]
     assert np.linalg.norm(case.body.rest[hit] / case.body.rest[hit, 2] * 0.06 - [0.005, 0.004, 0.06]) < 0.003
     assert under(case, np.zeros(3), np.array([1.0, 0.0, 0.1])) is None
+
+
+def named(case, **laws):
+    """The case with a diagnosis that named these laws."""
+    terms = {law: {n: {"value": v, "unit": ""} for n, v in numbers.items()} for law, numbers in laws.items()}
+    physics = replace(case.physics, terms=case.physics.terms | terms)
+    theta = prepare(case.body, tuple(physics.terms), density=physics.density).theta(values_of(physics))
+    return physics, replace(case.material, names=np.array(columns(choose(physics.terms))), values=theta)
+
+
+def test_a_law_that_was_named_moves_the_body_by_hand(case):
+    drag = named(case, drag={"c": 40.0})
+    plain, slowed = (Manipulation(case, (LEFT,), physics=physics) for physics in (None, drag))
+    for hand in (plain, slowed):
+        dragged(hand, 6)
+    assert np.abs(plain.state[0] - slowed.state[0]).max() > 1e-5
+
+
+def test_a_law_that_acts_by_the_clock_is_refused_by_hand(case):
+    weight = named(case, gravity={"x": 0.0, "y": 9.8, "z": 0.0, "onset": 0.1})
+    with pytest.raises(Problem, match="gravity acts at times of the recording"):
+        Manipulation(case, (LEFT,), physics=weight)
