@@ -12,6 +12,7 @@ from surgisim.report.contact import contact, depth_picture, tracked_picture
 from surgisim.report.distrust import distrust
 from surgisim.report.films import Film, strip
 from surgisim.report.headline import headline
+from surgisim.report.made import Made
 from surgisim.report.palette import DEPTH, PHASE, gradient
 from surgisim.report.parameters import parameters
 from surgisim.report.plots import plots
@@ -21,7 +22,7 @@ from surgisim.report.tables import grids, lists
 from surgisim.side_by_side import in_order, together
 
 
-def page(story: Story, *, progress=lambda *_: None) -> bytes:
+def page(story: Story, made: Made | None = None, *, progress=lambda *_: None) -> bytes:
     """The report, UTF-8, with every picture and film inside."""
     width = story.settings.panel
     with ThreadPoolExecutor(1) as beside:
@@ -30,6 +31,7 @@ def page(story: Story, *, progress=lambda *_: None) -> bytes:
         if not together():
             strips.result()
         content = {"story": story, "cards": headline(story), "doubts": distrust(story), "rows": contact(story)}
+        content["made"] = made
         progress(1, 5, "scene and body")
         content["scene"] = scene_views(story.run.scene, story.run.camera, width)
         content["body"] = body_views(story, (700, 600))
