@@ -1,5 +1,6 @@
 """One run as one HTML file."""
 
+import re
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from importlib.resources import files
@@ -54,7 +55,13 @@ def template(name: str) -> jinja2.Template:
     place = jinja2.Environment(
         loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
+    place.filters["kept_together"] = kept_together
     return place.get_template(name)
+
+
+def kept_together(text: str) -> str:
+    """A number and its unit do not go on different lines."""
+    return re.sub(r"(?<=\d) (?=(%|px|dB|mm|cm|s|ms|Pa|kPa|Hz)\b|%)", "\u00a0", text)
 
 
 def films(story: Story) -> list[tuple[str, Film]]:
