@@ -18,9 +18,11 @@ def main(board, *, settings, progress):
 
     from surgisim.proof.ablations import losses
     from surgisim.report.board.ablations import page
+    from surgisim.report.made import made
 
     found = losses({name: json.loads(path.read_text()) for name, path in zip(settings.ways, board, strict=True)})
-    return (json.dumps(found, indent=1, allow_nan=False) + "\n").encode(), page(found)
+    told = made({"ablations": settings.model_dump(mode="json")})
+    return (json.dumps(found, indent=1, allow_nan=False) + "\n").encode(), page(found, told)
 
 
 if __name__ == "__main__":

@@ -17,9 +17,10 @@ def main(score, *, settings, progress):
     import json
 
     from surgisim.report.board.known import page
+    from surgisim.report.made import made
 
     cases = [json.loads(path.read_text()) for path in score]
-    return (json.dumps(cases, indent=1, allow_nan=False) + "\n").encode(), page(cases)
+    return (json.dumps(cases, indent=1, allow_nan=False) + "\n").encode(), page(cases, made())
 
 
 if __name__ == "__main__":

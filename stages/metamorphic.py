@@ -21,10 +21,13 @@ def main(folder, before, *, settings, progress):
 
     from surgisim.proof.metamorphic import metamorphic
     from surgisim.report.board.metamorphic import page
+    from surgisim.report.made import made
 
     found = metamorphic(folder, settings.names, settings.perturbations)
     earlier = metamorphic(before, settings.names, settings.perturbations) if before else None
-    return (json.dumps(found | {"before": earlier}, indent=1, allow_nan=False) + "\n").encode(), page(found, earlier)
+    told = made({"metamorphic": settings.model_dump(mode="json")})
+    both = found | {"before": earlier}
+    return (json.dumps(both, indent=1, allow_nan=False) + "\n").encode(), page(found, earlier, told)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,8 @@
 
 reads   every artifact of the run, and metrics.json
 writes  report.html     one file, nothing outside it
+        yt.png          one column of pixels over time, recording above and replay below, with axes
+        thumbnail.jpg   the recording beside the replay at one moment, for pages with many runs
 """
 
 from surgisim.artifacts.body import Body
@@ -21,7 +23,7 @@ from surgisim.artifacts.replay import Replay
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
 from surgisim.artifacts.truth import Truth
-from surgisim.config.report import Report
+from surgisim.config.report import ReportOfRun
 from surgisim.stage import Bytes, Maybe, stage
 
 
@@ -46,17 +48,22 @@ from surgisim.stage import Bytes, Maybe, stage
         "metrics": Metrics,
         "truth": Maybe(Truth),
     },
-    writes={"report": Bytes(".html")},
-    settings=Report,
+    writes={"report": Bytes(".html"), "yt": Bytes(".png"), "thumbnail": Bytes(".jpg")},
+    settings=ReportOfRun,
 )
 def main(*, material, metrics, truth, settings, progress, **artifacts):
     from surgisim.measure.run import Run
     from surgisim.measure.truth_seen import seen
+    from surgisim.report.made import made
     from surgisim.report.page import page
+    from surgisim.report.plots import yt_slices
     from surgisim.report.story import Story
+    from surgisim.report.thumbnail import thumbnail
 
     run = Run(**artifacts, truth=truth and seen(truth, artifacts["camera"]))
-    return page(Story(run, material, metrics, settings), progress=progress)
+    story = Story(run, material, metrics, settings)
+    told = made(settings.stages, settings.code)
+    return page(story, told, progress=progress), yt_slices(story), thumbnail(story)
 
 
 if __name__ == "__main__":

@@ -21,12 +21,17 @@ def main(folder, before, *, settings, progress):
 
     from surgisim.proof.robustness import robustness
     from surgisim.report.board.robustness import page, picture, words
+    from surgisim.report.made import made
 
     found = robustness(folder, settings.bodies, settings.perturbations)
     earlier = robustness(folder, settings.bodies, settings.perturbations, before) if before else None
     print(words(found, earlier))
     told = found | {"before": earlier}
-    return (json.dumps(told, indent=1, allow_nan=False) + "\n").encode(), page(found, earlier), picture(found, earlier)
+    return (
+        (json.dumps(told, indent=1, allow_nan=False) + "\n").encode(),
+        page(found, earlier, made({"robustness": settings.model_dump(mode="json")})),
+        picture(found, earlier),
+    )
 
 
 if __name__ == "__main__":

@@ -21,10 +21,15 @@ def main(score, recording, *, settings, progress):
 
     from surgisim.proof.board import with_metadata
     from surgisim.report.board.page import page, table
+    from surgisim.report.made import made
 
     board = with_metadata([json.loads(path.read_text()) for path in score], recording)
     board |= {"seals": settings.seals or board["count"], "pages": settings.pages}
-    return (json.dumps(board, indent=1, allow_nan=False) + "\n").encode(), table(board), page(board)
+    return (
+        (json.dumps(board, indent=1, allow_nan=False) + "\n").encode(),
+        table(board),
+        page(board, made({"scoreboard": settings.model_dump(mode="json")})),
+    )
 
 
 if __name__ == "__main__":

@@ -24,11 +24,12 @@ def main(metrics, scenes, recordings, pictures, *, settings, progress):
 
     from surgisim.proof.tables import digest_of, tables
     from surgisim.report.board.tables import as_csv, as_markdown, page
+    from surgisim.report.made import made
 
     digests = {clip: digest_of(path) for clip, path in zip(settings.clips, recordings, strict=True)}
     found = tables(metrics, scenes, {"recordings": digests, **settings.receipt})
     whole = (json.dumps(found, indent=1, allow_nan=False) + "\n").encode()
-    return whole, page(found, [path.read_bytes() for path in pictures]), as_csv(found), as_markdown(found)
+    return whole, page(found, [path.read_bytes() for path in pictures], made()), as_csv(found), as_markdown(found)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ import importlib.metadata
 import os
 import platform
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -17,13 +16,13 @@ from rich.markup import escape
 from surgisim.config.base import parse
 from surgisim.config.whole import Whole, is_path
 from surgisim.launch import home
+from surgisim.machine import GIB, graphics, memory, processor
 from surgisim.order import chosen
 from surgisim.perception.optical_flow.choice import AUTO
 from surgisim.problem import Problem
 from surgisim.side_by_side import together
 from surgisim.weights import KINDS, Kind, found
 
-GIB = 2**30
 PACKAGES = ("surgisim", "snakemake", "numpy", "numba", "torch", "warp-lang", "opencv-python-headless", "av")
 OPTIONAL = {
     "onnxruntime": "no learned masks (SAM 2)",
@@ -67,8 +66,8 @@ def laws() -> None:
 
 def _machine() -> Iterator[Row]:
     cores = len(os.sched_getaffinity(0))
-    yield "processor", f"{_cpu()}, {cores} cores", "" if cores > 1 else "one core: expect twice the time"
-    total, free = _memory()
+    yield "processor", f"{processor()}, {cores} cores", "" if cores > 1 else "one core: expect twice the time"
+    total, free = memory()
     means = "enough" if free >= 6 else "enough for the embedded clip" if free >= 4 else "too little: 4 GB are wanted"
     yield "memory", f"{total:.1f} GB, {free:.1f} GB free", means
     disk = shutil.disk_usage(Path.cwd()).free / GIB
@@ -87,7 +86,7 @@ def _accelerators() -> Iterator[Row]:
     import torch
     import warp
 
-    cards = _nvidia()
+    cards = graphics()
     yield "GPU", ", ".join(cards) or "none", "use --profile gpu" if cards else "everything runs on the processor"
     usable = torch.cuda.is_available()
     build = "with CUDA" if torch.version.cuda else "for processors only"
@@ -171,26 +170,3 @@ def _without(key: str) -> str:
         return "no --sdm apptainer; nothing else needs it"
     brings = next((kind.brings for kind in KINDS if kind.setting == key), None)
     return f"would bring {brings}" if brings else "left out, or done by the built-in method"
-
-
-def _cpu() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.machine()
-
-
-def _memory() -> tuple[float, float]:
-    """Total and available [GB]."""
-    lines = (line.split() for line in Path("/proc/meminfo").read_text().splitlines())
-    kilobytes = {words[0].rstrip(":"): int(words[1]) for words in lines}
-    return kilobytes["MemTotal"] * 1024 / GIB, kilobytes["MemAvailable"] * 1024 / GIB
-
-
-def _nvidia() -> list[str]:
-    try:
-        command = ["nvidia-smi", "--query-gpu=name", "--format=csv,noheader"]
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
-    except (OSError, subprocess.CalledProcessError):
-        return []

@@ -1,5 +1,7 @@
 """Settings of the report."""
 
+from typing import Any
+
 from pydantic import Field
 
 from surgisim.config.base import Settings
@@ -16,3 +18,12 @@ class Report(Settings):
     """Constant rate factor of the films: lower is better and larger. [1]"""
     column: int | None = Field(None, ge=0)
     """Column of the Y-T slices; null takes the one that changes most. [px]"""
+
+
+class ReportOfRun(Report):
+    """What the report's script is told beside the user's choices."""
+
+    stages: dict[str, Any] = Field({})
+    """Settings of every stage of the run, by stage [object]."""
+    code: dict[str, str] = Field({})
+    """Digest of every stage's code, by stage [object]."""

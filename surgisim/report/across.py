@@ -1,7 +1,7 @@
 """All runs side by side: clips times variants."""
 
 import html
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -9,7 +9,10 @@ from surgisim.artifacts.metrics import Metrics
 from surgisim.problem import Problem
 from surgisim.report.charts.compare import compare
 from surgisim.report.digits import shown
+from surgisim.report.made import Made
 from surgisim.report.page import template
+from surgisim.report.parameters import Parameter, parameter
+from surgisim.report.uri import data_uri
 
 
 @dataclass(frozen=True)
@@ -17,7 +20,8 @@ class Measure:
     group: str
     name: str
     title: str
-    better: Literal["higher", "lower"]
+    better: Literal["higher", "lower", "neither"]
+    """neither: no value of it is the best."""
 
 
 MEASURES = (
@@ -58,9 +62,12 @@ MEASURES = (
     Measure("simulation", "psnr_after", "replay, PSNR, held out after", "higher"),
     Measure("simulation", "ssim_between", "replay, SSIM, held out between", "higher"),
     Measure("simulation", "lpips_between", "replay, LPIPS, held out between", "lower"),
-    Measure("replay", "smallest_det_f", "smallest det F of the replay", "higher"),
+    Measure("replay", "smallest_det_f", "smallest det F of the replay (1: undeformed)", "neither"),
 )
 """What the tables show. A variant that shares a stage with another shows the same number."""
+
+SYMBOLS = {"E": "Young's modulus E", "nu": "Poisson's ratio ν", "eta": "viscosity η"}
+"""Parameters of any law that the summary shows."""
 
 PLOTTED = (
     ("reconstruction", "psnr_between"),
@@ -89,19 +96,24 @@ def _row(measure: Measure, runs: dict[str, Metrics]) -> dict[str, Any] | None:
     if not values:
         return None
     first = next(entry for entry in entries.values() if entry)
-    best = (max if measure.better == "higher" else min)(values.values())
+    if measure.better == "neither" or len(set(values.values())) == 1:
+        best = []
+    else:
+        top = (max if measure.better == "higher" else min)(values.values())
+        best = [v for v, value in values.items() if value == top]
     return {
         "title": measure.title,
         "unit": first["unit"],
         "better": measure.better,
         "protocol": first["protocol"],
         "values": values,
-        "best": [v for v, value in values.items() if value == best] if len(set(values.values())) > 1 else [],
+        "best": best,
     }
 
 
-def page(runs: list[Metrics]) -> bytes:
-    """The summary as one HTML file, UTF-8."""
+def page(runs: list[Metrics], thumbnails: Sequence[bytes] = (), made: Made | None = None) -> bytes:
+    """The summary as one HTML file, UTF-8; thumbnails: a JPEG of each run, in the same order."""
+    pictures = {(r.clip, r.variant): data_uri(one, "image/jpeg") for r, one in zip(runs, thumbnails, strict=False)}
     clips = table(runs)
     variants = list(dict.fromkeys(run.variant for run in runs))
     sections = [
@@ -110,12 +122,26 @@ def page(runs: list[Metrics]) -> bytes:
             "variants": [v for v in variants if any(v in row["values"] for row in rows.values())],
             "rows": rows,
             "links": {run.variant: _link(run) for run in runs if run.clip == clip},
+            "pictures": {v: uri for (name, v), uri in pictures.items() if name == clip},
+            "physics": physics([run for run in runs if run.clip == clip]),
             "costs": {run.variant: _cost(run) for run in runs if run.clip == clip},
         }
         for clip, rows in clips.items()
     ]
     figures = list(_figures(clips, variants))
-    return template("summary.html.j2").render(sections=sections, figures=figures, shown=shown, runs=runs).encode()
+    content = {"sections": sections, "figures": figures, "shown": shown, "runs": runs, "made": made}
+    return template("summary.html.j2").render(**content).encode()
+
+
+def physics(runs: list[Metrics]) -> list[tuple[str, str, dict[str, Parameter]]]:
+    """Name, unit and variant -> what was fitted: stiffness, Poisson's ratio and viscosity of one clip's runs."""
+    rows: dict[str, tuple[str, dict[str, Parameter]]] = {}
+    for run in runs:
+        for name, entry in run.values.get("physics", {}).items():
+            if " / " not in name and name.rpartition(".")[2] in SYMBOLS and entry["value"] is not None:
+                row = rows.setdefault(name, ("" if entry["unit"] == "1" else entry["unit"], {}))
+                row[1][run.variant] = parameter(name, entry)
+    return [(f"{SYMBOLS[name.rpartition('.')[2]]} ({name.partition('.')[0]})", *row) for name, row in rows.items()]
 
 
 def _figures(clips: dict[str, Any], variants: list[str]) -> Iterator[tuple[str, str]]:

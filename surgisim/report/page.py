@@ -1,5 +1,6 @@
 """One run as one HTML file."""
 
+import re
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from importlib.resources import files
@@ -12,6 +13,7 @@ from surgisim.report.contact import contact, depth_picture, tracked_picture
 from surgisim.report.distrust import distrust
 from surgisim.report.films import Film, strip
 from surgisim.report.headline import headline
+from surgisim.report.made import Made
 from surgisim.report.palette import DEPTH, PHASE, gradient
 from surgisim.report.parameters import parameters
 from surgisim.report.plots import plots
@@ -21,7 +23,7 @@ from surgisim.report.tables import grids, lists
 from surgisim.side_by_side import in_order, together
 
 
-def page(story: Story, *, progress=lambda *_: None) -> bytes:
+def page(story: Story, made: Made | None = None, *, progress=lambda *_: None) -> bytes:
     """The report, UTF-8, with every picture and film inside."""
     width = story.settings.panel
     with ThreadPoolExecutor(1) as beside:
@@ -30,6 +32,7 @@ def page(story: Story, *, progress=lambda *_: None) -> bytes:
         if not together():
             strips.result()
         content = {"story": story, "cards": headline(story), "doubts": distrust(story), "rows": contact(story)}
+        content["made"] = made
         progress(1, 5, "scene and body")
         content["scene"] = scene_views(story.run.scene, story.run.camera, width)
         content["body"] = body_views(story, (700, 600))
@@ -52,7 +55,13 @@ def template(name: str) -> jinja2.Template:
     place = jinja2.Environment(
         loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
+    place.filters["kept_together"] = kept_together
     return place.get_template(name)
+
+
+def kept_together(text: str) -> str:
+    """A number and its unit do not go on different lines."""
+    return re.sub(r"(?<=\d) (?=(%|px|dB|mm|cm|s|ms|Pa|kPa|Hz)\b|%)", "\u00a0", text)
 
 
 def films(story: Story) -> list[tuple[str, Film]]:

@@ -34,10 +34,11 @@ def parameters(physics: Physics, fit: Fit, measured: dict[str, Any]) -> list[Par
     for name, found in fit.identifiability.items():
         if isinstance(found, dict):
             rows[name] = rows.get(name, {}) | found | measured.get(name, {})
-    return [_parameter(name, entry) for name, entry in rows.items()]
+    return [parameter(name, entry) for name, entry in rows.items()]
 
 
-def _parameter(name: str, entry: dict[str, Any]) -> Parameter:
+def parameter(name: str, entry: dict[str, Any]) -> Parameter:
+    """A row from {"value", "unit", "low" and "high" or "interval", "told", ...}."""
     low, high = _ends(entry)
     told = entry.get("told", entry.get("identifiable"))
     return Parameter(

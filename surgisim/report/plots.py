@@ -10,6 +10,7 @@ from surgisim.report.charts.energy import energy
 from surgisim.report.charts.fit import field, fit
 from surgisim.report.charts.history import history
 from surgisim.report.charts.over_time import Line, over_time
+from surgisim.report.charts.paper import photograph, png
 from surgisim.report.charts.slices import slices
 from surgisim.report.palette import RECONSTRUCTION, RECORDING, REPLAY, STILL
 from surgisim.report.story import Story
@@ -27,7 +28,7 @@ def plots(story: Story) -> dict[str, str | None]:
         "fit": fit(run.fit.history),
         "field": field(run.fit.history),
         "cost": cost(story.metrics.stages),
-        "slices": _slices(story),
+        "slices": slices(*_slices(story), photograph),
     }
 
 
@@ -88,7 +89,13 @@ def _movement(story: Story) -> str | None:
     return over_time(lines, "displacement [px]", story.time, story.phase, run.frames.split, from_zero=True)
 
 
-def _slices(story: Story) -> str:
+def yt_slices(story: Story) -> bytes:
+    """The Y-T slices as a figure of their own, PNG."""
+    return slices(*_slices(story), png)
+
+
+def _slices(story: Story) -> tuple[dict[str, np.ndarray], float, list[float]]:
+    """Slices by name, the clip's duration [s], and where its phases end [s]."""
     run = story.run
     column = story.settings.column
     column = liveliest_column(run.frames.rgb, run.masks.tissue) if column is None else min(column, run.camera.width - 1)
@@ -98,7 +105,7 @@ def _slices(story: Story) -> str:
         pictures["replay"] = slice_yt(run.replay.rgb, column)
     changes = np.flatnonzero(story.phase[1:] != story.phase[:-1]) + 1
     ends = [float(story.time[t]) for t in changes]
-    return slices(pictures, run.camera.frames / run.camera.fps, ends)
+    return pictures, run.camera.frames / run.camera.fps, ends
 
 
 def _phase_of(story: Story, count: int) -> np.ndarray:

@@ -186,6 +186,7 @@ CONCEALED |= {"study", "robustness", "metamorphic", "perturb", "draws", "draw", 
 CONCEALED |= {
     "interval_coverage",
     "clip_table",
+    "clip_pictures",
     "known",
     "known_direct",
     "known_score",
@@ -208,7 +209,7 @@ AGAIN = {
 }
 """Rules that run the module of another's name."""
 ASKED_FOR = {"blind", "blind_shuffled", "blind_ablations", "blind_phases", "blind_pooled", "blind_real"}
-ASKED_FOR |= {"clip_diagnoses", "coverage", "real_clips"}
+ASKED_FOR |= {"clip_diagnoses", "coverage", "real_clips", "pictures"}
 TAKEN_OVER = {"body", "body_again"}
 """The rule `invent` with other files: bodies whose answers are known to whoever develops."""
 """Rules without a stage of their own: what `snakemake NAME` makes."""

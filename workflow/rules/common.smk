@@ -123,6 +123,33 @@ def settings(stage, name=None):
     return placed(lambda w: PLAN.slices[stage, w.clip, w.variant], name or stage)
 
 
+def drawn(w):
+    """Params function: the report's settings, and every stage's settings and digest of code to put on the page."""
+    stages = [
+        stage for stage in PARENTS if stage != "phantom" or not PLAN.clips[w.clip].path
+    ]
+    told = {
+        stage: json.loads(PLAN.slices[stage, w.clip, w.variant]) for stage in stages
+    }
+    codes = {stage: _code(stage) for stage in stages}
+    return json.dumps({**told["report"], "stages": told, "code": codes}, sort_keys=True)
+
+
+def chosen_runs():
+    """Settings of every clip's first variant that runs, and what each other one changes, for the summary."""
+    told = {}
+    for clip in PLAN.clips:
+        wholes = {
+            v: {s: json.loads(PLAN.slices[s, clip, v]) for s in PARENTS}
+            for v in PLAN.run
+        }
+        first = wholes[PLAN.run[0]]
+        for variant, whole in wholes.items():
+            changed = {s: group for s, group in whole.items() if group != first[s]}
+            told[f"{clip}, {variant}"] = whole if whole is first else changed
+    return told
+
+
 def growing(amount):
     """Resource function: this much at first, and as much again with each attempt that failed."""
     return lambda wildcards, attempt: amount * attempt

@@ -136,6 +136,12 @@ rule known_board:
             f"known/{'direct/' if known.direct else ''}{name}/score.json"
             for name, known in KNOWN.items()
         ],
+        # The board links to them.
+        pages=[
+            f"known/{name}/diagnosis.html"
+            for name, known in KNOWN.items()
+            if not known.direct
+        ],
     output:
         table="known/known.json",
         page=report(

@@ -58,12 +58,7 @@ rule simulation:
             labels={"variant": "{variant}", "what": "replay"},
         ),
         final="results/{clip}/{variant}/simulation/final.ply",
-        yt=report(
-            "results/{clip}/{variant}/simulation/yt.png",
-            caption="../report/yt.rst",
-            category="{clip}",
-            labels={"variant": "{variant}", "what": "Y-T slice"},
-        ),
+        yt="results/{clip}/{variant}/simulation/yt.png",
     log:
         "logs/{clip}/{variant}/simulation.log",
     benchmark:

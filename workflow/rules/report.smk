@@ -80,6 +80,13 @@ rule report:
             category="{clip}",
             labels={"variant": "{variant}", "what": "everything"},
         ),
+        yt=report(
+            "results/{clip}/{variant}/report/yt.png",
+            caption="../report/yt.rst",
+            category="{clip}",
+            labels={"variant": "{variant}", "what": "Y-T slices"},
+        ),
+        thumbnail="results/{clip}/{variant}/report/thumbnail.jpg",
     log:
         "logs/{clip}/{variant}/report.log",
     benchmark:
@@ -91,7 +98,7 @@ rule report:
         mem_mb=growing(3000),
     params:
         truth=lambda w, input: f"--truth {input.truth}" if input.truth else "",
-        settings=settings("report"),
+        settings=drawn,
         code=code("report"),
     shell:
         'python "$SURGISIM/stages/report.py"'
@@ -101,6 +108,7 @@ rule report:
         " --rendered {input.rendered} --body {input.body} --material {input.material}"
         " --physics {input.physics} --fit {input.fit} --replay {input.replay}"
         " --metrics {input.metrics} {params.truth} --report {output.report}"
+        " --yt {output.yt} --thumbnail {output.thumbnail}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
@@ -108,6 +116,17 @@ rule summary:
     input:
         metrics=expand(
             "results/{clip}/{variant}/evaluation/metrics.json",
+            clip=PLAN.clips,
+            variant=PLAN.run,
+        ),
+        # The reports too: the page links to them.
+        thumbnails=expand(
+            "results/{clip}/{variant}/report/thumbnail.jpg",
+            clip=PLAN.clips,
+            variant=PLAN.run,
+        ),
+        reports=expand(
+            "results/{clip}/{variant}/report/report.html",
             clip=PLAN.clips,
             variant=PLAN.run,
         ),
@@ -123,8 +142,10 @@ rule summary:
     resources:
         mem_mb=growing(2000),
     params:
+        settings=lambda w: json.dumps({"runs": chosen_runs()}, sort_keys=True),
         code=lambda w: _code("summary"),
     shell:
         'python "$SURGISIM/stages/summary.py"'
-        " --metrics {input.metrics}"
-        " --table {output.table} --page {output.page} --code {params.code} > {log} 2>&1"
+        " --metrics {input.metrics} --thumbnails {input.thumbnails}"
+        " --table {output.table} --page {output.page}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"

@@ -4,6 +4,7 @@ from typing import Any
 
 from surgisim.report.board.page import told
 from surgisim.report.digits import shown
+from surgisim.report.made import Made
 from surgisim.report.page import template
 
 WORDS = {
@@ -19,9 +20,13 @@ WORDS = {
 }
 
 
-def page(found: dict[str, Any]) -> bytes:
+def page(found: dict[str, Any], made: Made | None = None) -> bytes:
     """UTF-8."""
-    return template("ablations.html.j2").render(**found, told=told, shown=shown, words=WORDS, mark=mark).encode()
+    return (
+        template("ablations.html.j2")
+        .render(**found, made=made, told=told, shown=shown, words=WORDS, mark=mark)
+        .encode()
+    )
 
 
 def mark(said: dict[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from typing import Any
 
 from surgisim.report.charts.paper import address, sheet
+from surgisim.report.made import Made
 from surgisim.report.page import template
 from surgisim.report.palette import RECORDING, REPLAY, TOOL
 
@@ -13,12 +14,12 @@ LINES = (
 )
 
 
-def page(cases: list[dict[str, Any]]) -> bytes:
+def page(cases: list[dict[str, Any]], made: Made | None = None) -> bytes:
     """UTF-8; a page of its own lies beside each diagnosis."""
     met = sum(a["met"] is True for c in cases for a in c["answers"])
     asked = sum(len(c["answers"]) for c in cases)
     pictures = {c["case"]: [(panel(p), p["title"]) for p in c.get("panels", ())] for c in cases}
-    return template("known.html.j2").render(cases=cases, met=met, asked=asked, pictures=pictures).encode()
+    return template("known.html.j2").render(cases=cases, met=met, asked=asked, pictures=pictures, made=made).encode()
 
 
 def panel(told: dict[str, Any]) -> str:

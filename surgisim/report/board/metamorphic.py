@@ -4,15 +4,16 @@ from typing import Any
 
 from surgisim.report.board.page import told
 from surgisim.report.board.robustness import sets
+from surgisim.report.made import Made
 from surgisim.report.page import template
 
 Found = dict[str, Any]
 
 
-def page(found: Found, before: Found | None) -> bytes:
+def page(found: Found, before: Found | None, made: Made | None = None) -> bytes:
     """UTF-8."""
     content = {"sets": sets(found, before), "told": told, "spread": spread, "mark": mark}
-    return template("metamorphic.html.j2").render(**content).encode()
+    return template("metamorphic.html.j2").render(**content, made=made).encode()
 
 
 def mark(old: dict[str, Any] | None, new: dict[str, Any]) -> str:

@@ -7,12 +7,13 @@ from typing import Any
 from surgisim.report.board import charts
 from surgisim.report.digits import shown
 from surgisim.report.headline import Card
+from surgisim.report.made import Made
 from surgisim.report.page import template
 
 Board = dict[str, Any]
 
 
-def page(board: Board) -> bytes:
+def page(board: Board, made: Made | None = None) -> bytes:
     """UTF-8, with every picture inside."""
     found = board["calibration"]
     pictures = {
@@ -23,7 +24,9 @@ def page(board: Board) -> bytes:
         "held_out": charts.held_out(board["held_out"]),
     }
     content = {"board": board, "pictures": pictures, "cards": cards(board)}
-    return template("scoreboard.html.j2").render(**content, percent=percent, found=told, number=number).encode()
+    return (
+        template("scoreboard.html.j2").render(**content, made=made, percent=percent, found=told, number=number).encode()
+    )
 
 
 def cards(board: Board) -> list[Card]:

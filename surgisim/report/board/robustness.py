@@ -7,6 +7,7 @@ from matplotlib.patches import Rectangle
 
 from surgisim.report.board.page import told
 from surgisim.report.charts.paper import png, sheet
+from surgisim.report.made import Made
 from surgisim.report.page import template
 from surgisim.report.palette import INK, REPLAY, TOOL
 
@@ -42,10 +43,10 @@ COLUMNS = {
 }
 
 
-def page(found: Found, before: Found | None) -> bytes:
+def page(found: Found, before: Found | None, made: Made | None = None) -> bytes:
     """UTF-8; what was found before stands below and beside."""
     content = {"sets": sets(found, before), "colors": COLORS, "dark": DARK, "legend": LEGEND, "short": SHORT}
-    return template("robustness.html.j2").render(**content, columns=COLUMNS, told=told).encode()
+    return template("robustness.html.j2").render(**content, made=made, columns=COLUMNS, told=told).encode()
 
 
 def picture(found: Found, before: Found | None) -> bytes:

@@ -11,16 +11,17 @@ from PIL import Image
 
 from surgisim.proof.tables import Cell, plain
 from surgisim.report.digits import shown
+from surgisim.report.made import Made
 from surgisim.report.page import template
 from surgisim.report.uri import jpeg
 
 
-def page(found: dict[str, Any], pictures: Iterable[bytes] = ()) -> bytes:
+def page(found: dict[str, Any], pictures: Iterable[bytes] = (), made: Made | None = None) -> bytes:
     """UTF-8. pictures: PNG of scenes' surfaces, shown below the table of environments."""
     told = found | {"receipt": json.dumps(found["receipt"], indent=1, sort_keys=True)}
     # A photograph's format: splats by the thousand fill a megabyte each as PNG.
     told["pictures"] = [jpeg(np.asarray(Image.open(io.BytesIO(one)).convert("RGB")), 80) for one in pictures]
-    return template("tables.html.j2").render(**told, in_words=in_words).encode()
+    return template("tables.html.j2").render(**told, made=made, in_words=in_words).encode()
 
 
 def as_csv(found: dict[str, Any]) -> bytes:

@@ -22,10 +22,11 @@ def fit(history: list[dict[str, Any]]) -> str | None:
         left, right = figure.subplots(1, 2)
         at = np.arange(1, len(steps) + 1)
         rounds = [row.get("round") for row in steps]
-        left.plot(at, [row["cost"] for row in steps], "o", ms=3, color=INK)
-        for name in dict.fromkeys(rounds):
-            inside = [k for k, r in enumerate(rounds) if r == name]
-            left.plot(at[inside], [steps[k]["cost"] for k in inside], color=INK)
+        costs = np.array([row["cost"] for row in steps], float)
+        pieces = descents(steps)
+        left.plot(at, costs, "o", ms=3, color=INK)
+        for piece in pieces:
+            left.plot(at[piece], costs[piece], color=INK)
         left.set_yscale("log")
         left.set_ylabel("cost, weighted squares [1]")
         names = dict.fromkeys(key for row in steps for key in row if "." in key)
@@ -34,7 +35,10 @@ def fit(history: list[dict[str, Any]]) -> str | None:
             first = values[np.isfinite(values)][0]
             # What may go through zero has no place on a logarithmic axis.
             if first and (values[np.isfinite(values)] / first > 0).all():
-                right.plot(at, values / first, "o-", ms=3, color=COLORS[k % len(COLORS)], label=name)
+                color = COLORS[k % len(COLORS)]
+                right.plot(at, values / first, "o", ms=3, color=color, label=name)
+                for piece in pieces:
+                    right.plot(at[piece], values[piece] / first, color=color)
         right.set_ylabel("parameter / its first value [1]")
         right.set_yscale("log")
         plain_ticks(right)
@@ -46,6 +50,22 @@ def fit(history: list[dict[str, Any]]) -> str | None:
                 if rounds[k] != rounds[k - 1]:
                     axes.axvline(at[k] - 0.5, color=MUTED, lw=0.9, ls=":")
         return address(figure)
+
+
+def descents(steps: list[dict[str, Any]]) -> list[slice]:
+    """Runs of steps that go on from one another: of one round, their iterations in order.
+
+    Starts, and whatever else has no iteration, are each one by themselves.
+    """
+    begins = [
+        k
+        for k, step in enumerate(steps)
+        if k == 0
+        or "iteration" not in step
+        or step.get("round") != steps[k - 1].get("round")
+        or step["iteration"] <= steps[k - 1].get("iteration", -1)
+    ]
+    return [slice(first, last) for first, last in zip(begins, [*begins[1:], len(steps)], strict=True)]
 
 
 def field(history: list[dict[str, Any]]) -> str | None:

@@ -5,6 +5,7 @@ from surgisim.report.diagnosed.case import Diagnosed
 from surgisim.report.diagnosed.laws import law
 from surgisim.report.digits import shown
 from surgisim.report.headline import Card
+from surgisim.report.made import Made
 from surgisim.report.page import template
 
 BADGE = {
@@ -15,7 +16,7 @@ BADGE = {
 }
 
 
-def page(case: Diagnosed, *, progress=lambda *_: None) -> bytes:
+def page(case: Diagnosed, made: Made | None = None, *, progress=lambda *_: None) -> bytes:
     """UTF-8, with every picture inside."""
     progress(0, 3, "places")
     pictures = {
@@ -34,7 +35,7 @@ def page(case: Diagnosed, *, progress=lambda *_: None) -> bytes:
     }
     content = {"case": case, "pictures": pictures, "cards": cards(case), "badge": BADGE[case.verdict.verdict]}
     content |= {"laws": [law(e, str(n)) for n, e in enumerate(case.verdict.effects, 1)], "title": title(case)}
-    text = template("diagnosis.html.j2").render(**content, shown=shown)
+    text = template("diagnosis.html.j2").render(**content, made=made, shown=shown)
     progress(3, 3, "written")
     return text.encode()
 
