@@ -2,11 +2,14 @@
 
 import math
 import zipfile
+import zlib
 
 import numpy as np
 
 DEFLATE = 1032
 """The most that Deflate can shrink anything."""
+UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, KeyError, TypeError, AttributeError)
+"""What reading a file that is no .npz, or a damaged one, raises."""
 
 
 def check_announced(archive: zipfile.ZipFile, most: float = math.inf) -> None:

@@ -11,14 +11,13 @@ import io
 import json
 import os
 import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
-from surgisim.artifacts.announced import check_announced
+from surgisim.artifacts.announced import UNREADABLE, check_announced
 from surgisim.artifacts.partial import clear_left, partial
 from surgisim.problem import Problem
 
@@ -63,16 +62,7 @@ class Artifact:
                 if missing:
                     raise Problem(f"{path}: lacks {missing} of a {cls.__name__}. Run the stage that makes it again.")
                 fields = {n: _plain(archive[n]) for n in names}
-        except (
-            zipfile.BadZipFile,
-            zlib.error,
-            EOFError,
-            OSError,
-            ValueError,
-            KeyError,
-            TypeError,
-            AttributeError,
-        ) as error:
+        except UNREADABLE as error:
             if isinstance(error, Problem | FileNotFoundError):
                 raise
             raise Problem(

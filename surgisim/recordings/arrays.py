@@ -1,13 +1,11 @@
 """The arrays of a recording's .npz files, each of the shape that the format says."""
 
-import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from surgisim.artifacts.announced import check_announced
+from surgisim.artifacts.announced import UNREADABLE, check_announced
 from surgisim.problem import Problem
 
 MOST = 4e9
@@ -24,7 +22,7 @@ def arrays(path: Path, shapes: Mapping[str, str], frames: int, optional: tuple[s
         with np.load(path, allow_pickle=False) as archive:
             check_announced(archive.zip, MOST)
             found = {name: archive[name] for name in shapes if name in archive.files}
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, TypeError, AttributeError) as error:
+    except UNREADABLE as error:
         raise Problem(f"{path}: cannot be read as plain arrays ({error}). Write it with numpy.savez.") from error
     lengths = {"T": frames, "3": 3}
     for name, letters in shapes.items():
