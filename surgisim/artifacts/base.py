@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
+from surgisim.artifacts.announced import UNREADABLE, check_announced
 from surgisim.artifacts.partial import clear_left, partial
 from surgisim.problem import Problem
 
@@ -48,6 +49,7 @@ class Artifact:
         """Read the file back, never unpickling anything."""
         try:
             with np.load(path, allow_pickle=False) as archive:
+                check_announced(archive.zip)
                 if HEADER not in archive:
                     raise Problem(
                         f"{path}: has no header, but a {cls.__name__} written by this project is wanted here. "
@@ -60,7 +62,7 @@ class Artifact:
                 if missing:
                     raise Problem(f"{path}: lacks {missing} of a {cls.__name__}. Run the stage that makes it again.")
                 fields = {n: _plain(archive[n]) for n in names}
-        except (zipfile.BadZipFile, EOFError, OSError, ValueError, KeyError) as error:
+        except UNREADABLE as error:
             if isinstance(error, Problem | FileNotFoundError):
                 raise
             raise Problem(

@@ -1,12 +1,15 @@
 """The arrays of a recording's .npz files, each of the shape that the format says."""
 
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
+from surgisim.artifacts.announced import UNREADABLE, check_announced
 from surgisim.problem import Problem
+
+MOST = 4e9
+"""Arrays of one file of a recording together [bytes]; measured tracks take megabytes."""
 
 
 def arrays(path: Path, shapes: Mapping[str, str], frames: int, optional: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
@@ -17,8 +20,9 @@ def arrays(path: Path, shapes: Mapping[str, str], frames: int, optional: tuple[s
     """
     try:
         with np.load(path, allow_pickle=False) as archive:
+            check_announced(archive.zip, MOST)
             found = {name: archive[name] for name in shapes if name in archive.files}
-    except (zipfile.BadZipFile, EOFError, OSError, ValueError, TypeError, AttributeError) as error:
+    except UNREADABLE as error:
         raise Problem(f"{path}: cannot be read as plain arrays ({error}). Write it with numpy.savez.") from error
     lengths = {"T": frames, "3": 3}
     for name, letters in shapes.items():

@@ -5,6 +5,7 @@ import pickle
 import struct
 import subprocess
 import sys
+import tarfile
 import zipfile
 import zlib
 from pathlib import Path
@@ -134,12 +135,40 @@ def cut_jpeg(path):
     return folder
 
 
-def image_that_claims_too_much(path):
-    folder = pictures(path / "clip", THREE)
-    data = bytearray(png(THREE[1]))
-    data[16:24] = struct.pack(">II", 100_000, 100_000)
+def claiming(data, side):
+    """A PNG whose header says that it is `side` pixels wide and high."""
+    data = bytearray(data)
+    data[16:24] = struct.pack(">II", side, side)
     data[29:33] = struct.pack(">I", zlib.crc32(bytes(data[12:29])))
-    (folder / "frame1.png").write_bytes(bytes(data))
+    return bytes(data)
+
+
+def image_that_claims_too_much(path, side=60_000):
+    folder = pictures(path / "clip", THREE)
+    (folder / "frame1.png").write_bytes(claiming(png(THREE[1]), side))
+    return folder
+
+
+def image_that_claims_somewhat_too_much(path):
+    # Below the number of pixels at which Pillow refuses by itself.
+    return image_that_claims_too_much(path, 12_000)
+
+
+def image_in_a_zip_that_claims_too_much(path):
+    return zipped(path / "clip.zip", {f"images/{t}.png": claiming(png(THREE[t]), 60_000) for t in range(3)})
+
+
+def mask_that_claims_too_much(path):
+    folder = endonerf(path / "clip")[0]
+    mask = folder / "gt_masks/frame8.png"
+    mask.write_bytes(claiming(mask.read_bytes(), 60_000))
+    return folder
+
+
+def depth_that_claims_too_much(path):
+    folder = endonerf(path / "clip")[0]
+    depth = sorted((folder / "depth").iterdir())[0]
+    depth.write_bytes(claiming(depth.read_bytes(), 60_000))
     return folder
 
 
@@ -178,6 +207,14 @@ def bare_pickle(path):
     return folder
 
 
+def poses_that_claim_too_much(path):
+    folder = endonerf(path / "clip")[0]
+    with open(folder / "poses_bounds.npy", "wb") as stream:
+        np.lib.format.write_array_header_1_0(stream, {"descr": "<f8", "fortran_order": False, "shape": (10**15, 17)})
+        stream.write(bytes(17 * 8))
+    return folder
+
+
 def poses_of_another_clip(path):
     folder = endonerf(path / "clip")[0]
     np.save(folder / "poses_bounds.npy", np.load(folder / "poses_bounds.npy") * 2)
@@ -203,6 +240,25 @@ def linking_zip(path):
         archive.writestr("images/0.png", png(THREE[0]))
         archive.writestr(link, "/etc/passwd")
     return path / "clip.zip"
+
+
+def linking_tar(path, name="clip.tar"):
+    link = tarfile.TarInfo("images/1.png")
+    link.type, link.linkname = tarfile.SYMTYPE, "/etc/passwd"
+    with tarfile.open(path / name, "w:gz" if name.endswith("gz") else "w") as archive:
+        archive.addfile(link)
+        archive.addfile(tarfile.TarInfo("../evil.png"))
+    return path / name
+
+
+def packed_tar(path):
+    return linking_tar(path, "clip.tar.gz")
+
+
+def zip_in_a_folder_that_climbs(path):
+    folder = empty_folder(path)
+    climbing_zip(folder)
+    return folder
 
 
 def zip_bomb(path):
@@ -244,16 +300,24 @@ BAD = {
     cut_image: "cut short",
     cut_jpeg: "cut short",
     image_that_claims_too_much: "claims",
+    image_that_claims_somewhat_too_much: "claims",
+    image_in_a_zip_that_claims_too_much: "claims",
+    mask_that_claims_too_much: "claims",
+    depth_that_claims_too_much: "claims",
     masks_of_another_size: "but the frames are",
     masks_of_another_count: "holds 8 images",
     depth_in_colour: "one grey channel",
     pickled_poses: "pickled",
     bare_pickle: "pickled",
+    poses_that_claim_too_much: "not a plain array",
     poses_of_another_clip: "Pass the poses of these frames",
     climbing_zip: "points out of the archive",
     climbing_zip_backwards: "points out of the archive",
     absolute_zip: "points out of the archive",
     linking_zip: "is a link",
+    zip_in_a_folder_that_climbs: "points out of the archive",
+    linking_tar: "is not a video",
+    packed_tar: "is not a video",
     zip_bomb: "is not a PNG",
     broken_zip: "cannot be read as a zip",
     damaged_zip_member: "damaged",

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -227,6 +228,20 @@ def test_nothing_is_unpickled(folder):
         else:
             (folder / "tracks.npz").write_bytes(content)
         refused(folder, "cannot be read as plain arrays")
+
+
+@pytest.mark.parametrize(("shape", "held"), [((10**15,), 8), ((60_000, 60_000), 8), ((2,), 24)])
+def test_an_array_that_announces_another_size_than_it_has_is_refused(folder, shape, held):
+    put(folder / "tracks.npz", **{"points": None})
+    with zipfile.ZipFile(folder / "tracks.npz", "a") as archive, archive.open("points.npy", "w") as member:
+        np.lib.format.write_array_header_1_0(member, {"descr": "<f8", "fortran_order": False, "shape": shape})
+        member.write(bytes(held))
+    refused(folder, "announces", "tracks.npz")
+
+
+def test_arrays_that_would_fill_the_memory_are_refused(folder, monkeypatch):
+    monkeypatch.setattr("surgisim.recordings.arrays.MOST", 100)
+    refused(folder, "at most 0.0 GB are read")
 
 
 def test_a_mesh_that_is_cut_short_is_named(folder):

@@ -140,7 +140,7 @@ def _focal(files: Tree, name: str, size: tuple[int, int]) -> float | None:
     where = f"{files.where}: {name}"
     try:
         poses = np.load(io.BytesIO(files.read(name)), allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
+    except (ValueError, EOFError, OSError, MemoryError) as error:
         raise Problem(
             f"{where}: is not a plain array of numbers (pickled files are never opened). Save it with numpy.save."
         ) from error

@@ -20,7 +20,8 @@ def page(found: dict[str, Any], pictures: Iterable[bytes] = (), made: Made | Non
     """UTF-8. pictures: PNG of scenes' surfaces, shown below the table of environments."""
     told = found | {"receipt": json.dumps(found["receipt"], indent=1, sort_keys=True)}
     # A photograph's format: splats by the thousand fill a megabyte each as PNG.
-    told["pictures"] = [jpeg(np.asarray(Image.open(io.BytesIO(one)).convert("RGB")), 80) for one in pictures]
+    opened = (Image.open(io.BytesIO(one), formats=["PNG"]) for one in pictures)
+    told["pictures"] = [jpeg(np.asarray(picture.convert("RGB")), 80) for picture in opened]
     return template("tables.html.j2").render(**told, made=made, in_words=in_words).encode()
 
 
