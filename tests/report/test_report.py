@@ -239,8 +239,8 @@ WIDER = """
     document.querySelectorAll('details').forEach(d => d.open = true);
     if (document.documentElement.scrollWidth <= innerWidth) return [];
     return [...document.querySelectorAll('body *')]
-        .filter(e => e.getBoundingClientRect().right > innerWidth + 1 && !e.closest('.scroll, pre'))
-        .map(e => e.outerHTML.slice(0, 120)).slice(-3)"""
+        .filter(e => e.getBoundingClientRect().right > innerWidth + 1)
+        .map(e => e.outerHTML.slice(0, 120)).concat(`${document.documentElement.scrollWidth} px wide`).slice(-4)"""
 STICKY = """
     const links = document.querySelector('nav.contents > div');
     return [links.parentElement.getBoundingClientRect().top, getComputedStyle(links).display !== 'none']"""
