@@ -115,6 +115,7 @@ def test_beside_what_nobody_knows_a_base_is_less_surely_known_up_to_what_is_know
     assert Known(prior, aside).beside(100.0, USUAL).near == pytest.approx(prior)
 
 
+@pytest.mark.slow
 def test_a_base_is_fitted_anew_where_a_run_fits_worse_than_promised(monkeypatch):
     made = recording()
 
@@ -136,6 +137,7 @@ def test_a_body_is_found_within_what_is_said_of_it():
     assert (np.abs(case.base.x - TRUE) < 2.5 * case.base.spread).all()
 
 
+@pytest.mark.slow
 def test_with_a_law_taken_off_the_base_is_found_again_from_far_off():
     made = plain()
     far = np.array([TRUE[0] + np.log(8.0), made.base.x[1], TRUE[2] - 1.0])

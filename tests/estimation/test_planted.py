@@ -18,6 +18,7 @@ from surgisim.physics.place import Place
 from surgisim.problem import Problem
 
 
+@pytest.mark.slow
 def test_planted_parameters_are_found_from_a_pull_and_its_release():
     _, physics, fit, *_ = estimate(*clip(), Estimation(**QUICK), silent)
     E, nu = (physics.terms["corotated"][p]["value"] for p in ("E", "nu"))
@@ -41,6 +42,7 @@ def test_planted_parameters_are_found_from_a_pull_and_its_release():
     assert "damps free vibration" in fit.words
 
 
+@pytest.mark.slow
 def test_a_pull_without_a_release_cannot_tell_the_modulus():
     slow = pulled(frames=T, hold=T)
     _, _, fit, *_ = estimate(*clip(motion=slow, noise=1e-4), Estimation(**QUICK), silent)
@@ -50,6 +52,7 @@ def test_a_pull_without_a_release_cannot_tell_the_modulus():
     assert "cannot tell" in fit.words
 
 
+@pytest.mark.slow
 def test_without_a_grip_nothing_is_fitted_and_the_fit_says_so():
     case = list(clip())
     motion = case[3]

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import Browser, installed
 from proof import made_up
 from proof.made_up import diagnosis, named
-from report.browser import Browser, installed
 
 from surgisim.artifacts.verdict import Effect
 from surgisim.physics.catalogue import catalogue

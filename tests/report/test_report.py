@@ -6,7 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
-from report.browser import Browser, installed
+from browser import Browser, installed
 from report.made_up import invent
 from slab import slab
 
