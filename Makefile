@@ -1,6 +1,6 @@
 # make demo              set up once, run the whole graph on the embedded clip, say where the report is
 # make demo VIDEO=clip.mp4 [OUT=folder]    the same on your own clip
-# make test, make lint   what CI runs
+# make test              all but the slow tests;  make test-all, make lint   what CI runs
 # make config            rewrite config/config.yaml and config/schemas/ from the settings models, envs/ from the lock
 # make lock              choose the newest fitting versions anew and write requirements.txt; then make config
 
@@ -8,7 +8,7 @@ BIN := .venv/bin
 OUT ?= .
 ARGS ?=
 
-.PHONY: demo test lint config lock setup clean
+.PHONY: demo test test-all lint config lock setup clean
 .DEFAULT_GOAL := demo
 
 setup:
@@ -17,8 +17,14 @@ setup:
 demo: setup
 	@$(BIN)/surgisim $(if $(VIDEO),run "$(VIDEO)",demo) --out "$(OUT)" $(ARGS)
 
+# Files in the order of tests/conftest.py, the longest first: with a worker each, a long one at the end would run alone.
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+
 test: setup
-	@$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+	@$(PYTEST) -m "not slow" $(ARGS)
+
+test-all: setup
+	@$(PYTEST) $(ARGS)
 
 lint: setup
 	$(BIN)/ruff check .

@@ -33,6 +33,7 @@ def test_a_clip_goes_through_the_whole_graph_and_the_second_time_through_nothing
     assert "nothing to do" in tree.surgisim("run", "my clip.mp4", "--out", "there").stdout
 
 
+@pytest.mark.slow
 def test_all_variants_of_a_table_of_clips_run_in_one_call(tree):
     (tree.root / "two.tsv").write_text("name\tpath\na\tphantom\nb\tphantom\n")
     done = tree.surgisim("run", "two.tsv", "--variant", "all", "--out", "there")

@@ -115,6 +115,7 @@ def test_beside_what_nobody_knows_a_base_is_less_surely_known_up_to_what_is_know
     assert Known(prior, aside).beside(100.0, USUAL).near == pytest.approx(prior)
 
 
+@pytest.mark.slow
 def test_a_base_is_fitted_anew_where_a_run_fits_worse_than_promised(monkeypatch):
     made = recording()
 
@@ -136,6 +137,7 @@ def test_a_body_is_found_within_what_is_said_of_it():
     assert (np.abs(case.base.x - TRUE) < 2.5 * case.base.spread).all()
 
 
+@pytest.mark.slow
 def test_with_a_law_taken_off_the_base_is_found_again_from_far_off():
     made = plain()
     far = np.array([TRUE[0] + np.log(8.0), made.base.x[1], TRUE[2] - 1.0])
@@ -166,6 +168,7 @@ def let_go_late():
     return recording(fps=QUICK, late=LATE, sigma=4e-5)
 
 
+@pytest.mark.slow
 def test_a_release_that_falls_between_frames_is_found_and_the_stiffness_with_it(let_go_late):
     case = case_of(let_go_late)
     # A softer body that lets go a little earlier looks nearly alike; one held to another moment is off by .5 and more.
@@ -174,6 +177,7 @@ def test_a_release_that_falls_between_frames_is_found_and_the_stiffness_with_it(
     assert (np.abs(case.base.x - TRUE) < 2.5 * case.base.spread).all()
 
 
+@pytest.mark.slow
 def test_a_release_taken_to_fall_elsewhere_gives_another_body_that_fits_worse(let_go_late):
     case, other = case_of(let_go_late), case_of(let_go_late, without=["release"])
     assert other.clip.opening[0, 17] == OPENS
@@ -182,6 +186,7 @@ def test_a_release_taken_to_fall_elsewhere_gives_another_body_that_fits_worse(le
     assert chi[1] > chi[0] + 100
 
 
+@pytest.mark.slow
 def test_tissue_of_a_finer_grid_is_not_taken_for_a_stiffer_one():
     made = recording(fps=QUICK, sigma=4e-5, share=FINER * GRID)
     # A camera that may drift would make up for a part of it.

@@ -63,6 +63,7 @@ def signature(block, h) -> np.ndarray:
     return np.tensordot(h.mix @ strength(h), block.columns, (0, 0))
 
 
+@pytest.mark.slow
 @every_law
 def test_a_law_is_tried_and_says_what_the_engine_runs(case, tried, name):
     for scope, (_, h) in tried[name].items():
@@ -79,11 +80,13 @@ def test_a_law_is_tried_and_says_what_the_engine_runs(case, tried, name):
             assert np.isfinite(prepared.theta({**values_of(case.base.x), **law.values}, law.places)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WHOLE_OR_PART)
 def test_laws_of_stress_are_tried_everywhere_in_layers_and_in_blobs(tried, name):
     assert set(tried[name]) == {"everywhere", "layer", "blob"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WHOLE_OR_PART)
 def test_in_a_blob_the_engine_does_what_the_signature_says(case, tried, name):
     (block, h), clip = tried[name]["blob"], case.clip
@@ -115,6 +118,7 @@ def difference(case, much, little) -> np.ndarray:
     return first - second
 
 
+@pytest.mark.slow
 @every_law
 def test_two_sentences_can_be_said(case, tried, name):
     law = LAWS[name]
@@ -127,6 +131,7 @@ def test_two_sentences_can_be_said(case, tried, name):
         assert said.count(". ") == 1
 
 
+@pytest.mark.slow
 @every_law
 def test_numbers_have_intervals_that_hold_them(case, tried, name):
     for _, h in tried[name].values():
@@ -137,6 +142,7 @@ def test_numbers_have_intervals_that_hold_them(case, tried, name):
         assert any(n["low"] < n["value"] < n["high"] for n in numbers.values())
 
 
+@pytest.mark.slow
 @every_law
 def test_a_knob_that_is_not_turned_changes_nothing_and_one_that_is_does(case, tried, name):
     for scope, (_, h) in tried[name].items():

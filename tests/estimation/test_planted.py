@@ -18,6 +18,7 @@ from surgisim.physics.place import Place
 from surgisim.problem import Problem
 
 
+@pytest.mark.slow
 def test_planted_parameters_are_found_from_a_pull_and_its_release():
     _, physics, fit, *_ = estimate(*clip(), Estimation(**QUICK), silent)
     E, nu = (physics.terms["corotated"][p]["value"] for p in ("E", "nu"))
@@ -41,6 +42,7 @@ def test_planted_parameters_are_found_from_a_pull_and_its_release():
     assert "damps free vibration" in fit.words
 
 
+@pytest.mark.slow
 def test_a_pull_without_a_release_cannot_tell_the_modulus():
     slow = pulled(frames=T, hold=T)
     _, _, fit, *_ = estimate(*clip(motion=slow, noise=1e-4), Estimation(**QUICK), silent)
@@ -50,6 +52,7 @@ def test_a_pull_without_a_release_cannot_tell_the_modulus():
     assert "cannot tell" in fit.words
 
 
+@pytest.mark.slow
 def test_without_a_grip_nothing_is_fitted_and_the_fit_says_so():
     case = list(clip())
     motion = case[3]
@@ -67,6 +70,7 @@ def test_a_grip_that_never_moves_teaches_nothing():
     assert "no motion to learn" in estimate(*case, Estimation(**QUICK), silent)[2].words
 
 
+@pytest.mark.slow
 def test_a_still_clip_is_called_still():
     case = list(clip())
     xy = np.repeat(case[2].xy[:, :1], T, 1)
@@ -74,6 +78,7 @@ def test_a_still_clip_is_called_still():
     assert "Nothing moves in this clip" in estimate(*case, Estimation(**QUICK), silent)[2].words
 
 
+@pytest.mark.slow
 def test_frames_held_out_are_never_looked_at():
     case, settings = clip(), Estimation(**QUICK | {"iterations": 1})
     first = estimate(*case, settings, silent)
@@ -85,6 +90,7 @@ def test_frames_held_out_are_never_looked_at():
     assert np.array_equal(first[0].values, second[0].values)
 
 
+@pytest.mark.slow
 def test_a_stiff_half_is_found_by_the_refinement():
     def stiff(rest):
         return np.where(rest[:, 0] > 0, 2.0, 0.7)
@@ -97,6 +103,7 @@ def test_a_stiff_half_is_found_by_the_refinement():
     assert E[right].mean() > 1.15 * E[~right].mean()
 
 
+@pytest.mark.slow
 def test_a_lump_whose_place_is_given_tells_how_stiff_it_is():
     places = {"stiff_inclusion": Place((0.009, 0.0, 0.066), 0.006)}
     known = TRUE | {"stiff_inclusion": {"s": 1.2}}
@@ -109,6 +116,7 @@ def test_a_lump_whose_place_is_given_tells_how_stiff_it_is():
     assert physics.places["stiff_inclusion"]["extent"] == 0.006
 
 
+@pytest.mark.slow
 def test_a_place_for_a_law_that_the_body_lacks_is_refused():
     settings = Estimation(**QUICK, places={"tether": {"center": (0.0, 0.0, 0.06), "extent": 0.01}})
     with pytest.raises(Problem, match=r"estimation\.places' names 'tether'"):

@@ -11,6 +11,8 @@ from surgisim.problem import Problem
 
 every_law = pytest.mark.parametrize("name", TERMS)
 every_state = pytest.mark.parametrize("state", ["rest", "equal stretch", "turned"])
+# A second each, but some two hundred and fifty of them.
+one_step_or_many = pytest.mark.parametrize("steps", [1, pytest.param(1000, marks=pytest.mark.slow)])
 
 
 def own(name, names=None):
@@ -75,7 +77,7 @@ def case(name, state, steps, precision="double", memory_mb=512.0, sharp=False):
 
 @every_law
 @every_state
-@pytest.mark.parametrize("steps", [1, 1000])
+@one_step_or_many
 def test_the_adjoint_of_a_run_is_the_slope_of_its_loss(name, state, steps):
     assert_slope(name, steps, *case(name, state, steps))
 
@@ -100,7 +102,7 @@ def assert_slope(name, steps, run, theta, at, out, c, gradient):
 
 @every_law
 @every_state
-@pytest.mark.parametrize("steps", [1, 1000])
+@one_step_or_many
 def test_single_precision_gives_the_same_gradient_to_a_hundredth(name, state, steps):
     _, theta, _, out, c, exact = case(name, state, steps)
     *_, single = case(name, state, steps, "single")

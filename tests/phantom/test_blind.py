@@ -204,6 +204,7 @@ def test_two_effects_that_tissue_does_not_bear_at_once_are_weaker():
     assert at_once(weaker, measure) == (weaker, ratio)
 
 
+@pytest.mark.slow
 def test_pulls_that_tear_tissue_are_shortened_and_others_are_not():
     spacings = QUICK.spacing, QUICK.spacing_coarse
     scene = draw(np.random.default_rng(5), fps=QUICK.fps, points=QUICK.points, spacings=spacings)

@@ -128,6 +128,7 @@ def test_a_setting_reaches_its_own_stage_and_what_follows(finished):
         finished.choices = {}
 
 
+@pytest.mark.slow
 def test_what_a_failed_stage_left_from_before_is_not_taken_for_new(tree):
     assert tree.run() == 0
     tree.edit("stages/depth.py")
