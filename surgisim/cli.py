@@ -1,10 +1,12 @@
 """The command `surgisim`: run the graph on a clip, and say what this machine and this project have."""
 
+import importlib.util
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from surgisim.problem import Problem
 from surgisim.stage import Progress, plain_errors
 
 app = typer.Typer(
@@ -168,6 +170,10 @@ def view(
         from surgisim.viewer.gate import checked_token
 
         checked_token(host, token)
+        if importlib.util.find_spec("viser") is None:
+            raise Problem(
+                "view: this Python has no viser. Install it with pip install 'surgisim[view]', or run make setup."
+            )
         from surgisim.viewer.app import Viewer
         from surgisim.viewer.case import chosen, read
 

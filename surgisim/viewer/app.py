@@ -68,14 +68,14 @@ class Viewer:
         self._cut_from: np.ndarray | None = None
         self.hand: Manipulation | None = None
         self._followers: dict[int, Follower | FollowerOnDevice] = {}
-        self.playing, self.running, self.tick = False, False, 0
+        self.playing, self.running = False, False
         self._unshown: tuple[Follower | FollowerOnDevice, np.ndarray] | None = None
         self._spent: deque[float] = deque(maxlen=30)
         self._ahead = ThreadPoolExecutor(1)
         self._replay = Follower(case, GridNodes(case.replay.origin, case.replay.shape, case.replay.spacing))
         self._reconstructed = Reconstructed(case)
         self._middle = SCALE * np.array([0.0, 0.0, float(np.median(case.scene.mean[:, 2]))])
-        self._size = SCALE * float(np.ptp(case.body.rest[:, :2], axis=0).max())
+        self.size = SCALE * float(np.ptp(case.body.rest[:, :2], axis=0).max())
         self._draw_scene()
         self._draw_controls()
         self._show_frame(0)
@@ -163,7 +163,7 @@ class Viewer:
             gui.add_markdown(parameters(case))
         self._holding = True
         does = (
-            (self.play, self._play), (self.start, self._start), (self.let_go, self._release),
+            (self.play, self._play), (self.start, self.begin), (self.let_go, self._release),
             (self.sever, self._sever), (self.reset, self._reset), (self.clear, self._clear),
             (self.export, self._export),
         )  # fmt: skip
@@ -304,7 +304,7 @@ class Viewer:
         self.grasps.append(Grasp(tuple(map(float, place)), 1e-3 * float(self.radius.value)))
         name = f"/grip{len(self.grasps)}"
         arrows = self.server.scene.add_transform_controls(
-            name, scale=0.2 * self._size, disable_rotations=True, depth_test=False, position=SCALE * (place + offset)
+            name, scale=0.2 * self.size, disable_rotations=True, depth_test=False, position=SCALE * (place + offset)
         )
         self.gizmos.append(arrows)
         self.server.scene.add_icosphere(
@@ -331,7 +331,8 @@ class Viewer:
         self.hand, self.running, self._followers, self._unshown = None, False, {}, None
         self.start.label = "Start"
 
-    def _start(self) -> None:
+    def begin(self) -> None:
+        """Lay the body on its grid and take hold; pause where it goes, go on where it is paused."""
         if self.running:
             self.running, self.start.label = False, "Go on"
             self._show_state()

@@ -101,7 +101,7 @@ def measure(particles: int, gaussians: int, grid: int, frames: int, device: str)
         face = case.body.rest[case.body.surface]
         place = face[np.linalg.norm(face - face.mean(0), axis=1).argmin()].astype(float)
         viewer.add_grasp(place, np.zeros(3))
-        viewer._start()
+        viewer.begin()
         reach = 0.15 * float(np.ptp(case.body.rest[:, 0]))
         once = 32 * gaussians
         for k in range(frames + WARM):

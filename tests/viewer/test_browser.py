@@ -56,7 +56,7 @@ def test_what_is_dragged_in_a_browser_moves_the_body_and_replays_by_command(case
         # The camera stands where the recording's stood, with its angle from top to bottom.
         focal = height / (case.camera.height / case.camera.fy)
         at = np.array(viewer.gizmos[0].position)
-        arrow = at + np.array([0.8 * 0.2 * viewer._size, 0.0, 0.0])
+        arrow = at + np.array([0.8 * 0.2 * viewer.size, 0.0, 0.0])
         tip = middle + focal * arrow[:2] / arrow[2]
         browser.drag(tuple(tip), *(tuple(tip + np.array([20.0 * k, 0.0])) for k in (1, 2, 3)))
         until(lambda: abs(viewer.hand.offsets[0, 0]) > 1e-3)
