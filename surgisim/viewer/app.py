@@ -307,9 +307,9 @@ class Viewer:
             name, scale=0.2 * self.size, disable_rotations=True, depth_test=False, position=SCALE * (place + offset)
         )
         self.gizmos.append(arrows)
-        self.server.scene.add_icosphere(
-            f"{name}/ball", radius=SCALE * self.grasps[-1].radius, color=GRIPPED, opacity=0.15
-        )
+        # Drawn in lines: splats behind a surface that lets light through are left out by the browser.
+        ball = circles(SCALE * self.grasps[-1].radius)
+        self.server.scene.add_line_segments(f"{name}/ball", ball, GRIPPED, line_width=2)
         self._stale()
 
     def _place_cut(self, place: np.ndarray) -> None:
@@ -345,6 +345,7 @@ class Viewer:
             named = self.case.named if self.law.value != "fitted" else None
             self.hand = Manipulation(self.case, tuple(self.grasps), self.cut, physics=named, device=self.device)
             self._follower()
+            self.say("Drag the arrows.")
         self.playing, self.running, self.start.label = False, True, "Pause"
         self._spent.clear()
 
@@ -458,3 +459,10 @@ class Viewer:
         self.gate.close()
         with contextlib.redirect_stdout(io.StringIO()):
             self.server.stop()
+
+
+def circles(radius: float, pieces: int = 48) -> np.ndarray:
+    """Three circles around the origin, one across each axis, as segments (3 pieces, 2, 3)."""
+    angle = np.linspace(0, 2 * np.pi, pieces + 1)
+    flat = radius * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], 1)
+    return np.concatenate([np.stack([ring[:-1], ring[1:]], 1) for ring in (np.roll(flat, k, 1) for k in range(3))])
