@@ -2,12 +2,16 @@
 
 import importlib.util
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from surgisim.problem import Problem
 from surgisim.stage import Progress, plain_errors
+
+if TYPE_CHECKING:
+    from surgisim.viewer.app import Viewer
+    from surgisim.viewer.pick import PickPage
 
 app = typer.Typer(
     help="From a monocular surgical video to a simulation with the tissue's own physics.",
@@ -176,15 +180,10 @@ def view(
             )
         from surgisim.viewer.app import Viewer
         from surgisim.viewer.case import chosen, read
+        from surgisim.viewer.manipulation import checked_device
 
-        viewer = Viewer(read(out, *chosen(out, clip, variant)), out, host=host, port=port, token=token, device=device)
-        typer.echo(f"{viewer.address} shows it. Ctrl-C ends it.")
-        try:
-            viewer.serve()
-        except KeyboardInterrupt:
-            typer.echo("ended.")
-        finally:
-            viewer.close()
+        case = read(out, *chosen(out, clip, variant))
+        _serve(Viewer(case, out, host=host, port=port, token=token, device=checked_device(device)))
 
 
 @app.command()
@@ -207,14 +206,18 @@ def pick(
         checked_token(host, token)
         settings = of_picking(tuple(config or ()), tuple(set_ or ()))
         picking = Picking(clip, out, settings.ingest, settings.masking, progress=Progress("pick"))
-        page = PickPage(picking, host=host, port=port, token=token)
-        typer.echo(f"{page.address} shows it. Ctrl-C ends it.")
-        try:
-            page.wait()
-        except KeyboardInterrupt:
-            typer.echo("ended.")
-        finally:
-            page.close()
+        _serve(PickPage(picking, host=host, port=port, token=token))
+
+
+def _serve(page: "Viewer | PickPage") -> None:
+    """Until somebody ends it."""
+    typer.echo(f"{page.address} shows it. Ctrl-C ends it.")
+    try:
+        page.serve()
+    except KeyboardInterrupt:
+        typer.echo("ended.")
+    finally:
+        page.close()
 
 
 @app.command()

@@ -32,7 +32,8 @@ FASTEST = 0.5
 
 
 MOST_STEPS = 256
-"""Steps between two states that are shown on a GPU: 27 ms for 100,000 particles on an H200."""
+"""Most steps between two states that are shown on a GPU, so that 100,000 particles are seen over 30 times a
+second (an H200 showed 23.3 frames of 389 steps a second)."""
 
 
 @dataclass(frozen=True)
@@ -183,6 +184,15 @@ def _refuse_clocks(law: Physics) -> None:
             f"view: {', '.join(timed)} acts at times of the recording, which a run by hand does not have. Choose the "
             "body 'fitted', or repeat an exported operation by command."
         )
+
+
+def checked_device(device: str) -> str:
+    """Raise Problem for a device that is none, or that this machine lacks."""
+    if device not in ("cpu", "cuda"):
+        raise Problem(f"--device is '{device}'; cpu or cuda is wanted.")
+    if device == "cuda" and not wp.is_cuda_available():
+        raise Problem("--device cuda: this machine has no CUDA device that Warp finds. Take cpu.")
+    return device
 
 
 def _still(grasps: tuple[Grasp, ...]) -> Motion:

@@ -176,8 +176,8 @@ class PickPage:
             return "application/json", _json(self.picking.save(marks))
         raise LookupError(f"{path}: nothing is asked for there.")
 
-    def wait(self) -> None:
-        """Until the thread that serves it ends."""
+    def serve(self) -> None:
+        """Wait for the thread that answers."""
         self.thread.join()
 
     def close(self) -> None:

@@ -42,3 +42,9 @@ def test_a_page_for_the_network_is_refused_before_anything_is_read(tmp_path):
 
 def test_the_parameters_come_with_their_intervals(case):
     assert "| corotated | E | 2000 Pa | 1.8e+03 to 2.2e+03 |" in parameters(case)
+
+
+def test_a_device_that_is_not_there_is_said(case, out):
+    answer = CliRunner().invoke(app, ["view", str(out), "--device", "gpu"])
+    assert answer.exit_code != 0
+    assert "cpu or cuda is wanted" in answer.output

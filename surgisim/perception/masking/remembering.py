@@ -2,7 +2,8 @@
 
 Each place of a frame takes the labels of those places of the remembered frames whose features are most like its own,
 among the last frames only near it. Jabri, Owens and Efros, Space-time correspondence as a contrastive random walk,
-NeurIPS 2020, tell labels from frame to frame in this way; numbers are theirs but for the temperature.
+NeurIPS 2020, tell labels from frame to frame in this way. The numbers below were tried on two clips
+(docs/benchmarks/learned.md).
 """
 
 from collections.abc import Sequence
