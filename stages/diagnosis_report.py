@@ -21,9 +21,9 @@ from surgisim.stage import Bytes, Source, stage
 def main(*, recording, diagnosis, mismatch, physics, settings, progress):
     from surgisim.report.diagnosed.case import read
     from surgisim.report.diagnosed.page import page
-    from surgisim.report.made import made
 
-    return page(read(recording, diagnosis, mismatch, physics), made(), progress=progress)
+    case = read(recording, diagnosis, mismatch, physics)
+    return page(case, case.made(), progress=progress)
 
 
 if __name__ == "__main__":

@@ -147,7 +147,8 @@ def diagnose(
     with plain_errors(debug):
         typer.echo(carry_out(recording, out, of_diagnosis(tuple(config or ()), tuple(set_ or ()))))
         files = (out / name for name in ("diagnosis.json", "mismatch.npz", "physics.json"))
-        save_bytes({out / "diagnosis.html": page(read(recording, *files), progress=Progress("page"))})
+        case = read(recording, *files)
+        save_bytes({out / "diagnosis.html": page(case, case.made(), progress=Progress("page"))})
         typer.echo(f"{out / 'diagnosis.html'} shows it.")
 
 

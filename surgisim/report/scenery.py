@@ -5,7 +5,10 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from surgisim.artifacts.body import Body
 from surgisim.artifacts.camera import Camera
+from surgisim.artifacts.material import Material
+from surgisim.artifacts.motion import Motion
 from surgisim.artifacts.scene import Scene
 from surgisim.gaussians.attributes import drawn
 from surgisim.gaussians.rasterise import render, to_bytes
@@ -47,11 +50,10 @@ def turned(scene: Scene, camera: Camera, yaw: float, pitch: float) -> np.ndarray
     return to_bytes(render(placed, quaternion, scale, opacity, color, camera, background=WHITE).rgb)
 
 
-def colors(story: Story) -> np.ndarray:
+def colors(body: Body, material: Material) -> np.ndarray:
     """Particles' own colours, held ones marked, (P, 3) 0-255."""
-    body = story.run.body
     own = 255 * body.color.astype(float)
-    return np.where(story.material.held[:, None], 0.35 * own + 0.65 * rgb(HELD), own)
+    return np.where(material.held[:, None], 0.35 * own + 0.65 * rgb(HELD), own)
 
 
 def body_views(story: Story, size: tuple[int, int]) -> dict[str, str]:
@@ -61,15 +63,21 @@ def body_views(story: Story, size: tuple[int, int]) -> dict[str, str]:
     unit = _unit(story)
     flank = look(rest, 90, 0, size)
     grips = tuple(zip(run.motion.center_rest, run.motion.radius, strict=True))
-    cut = section(story)
+    cut = section(run.body, run.motion)
     away, below, sideways = f"away from the camera, z [{unit}]", f"down, y [{unit}]", f"right, x [{unit}]"
     views = {
         "from the camera": particles(
-            rest, colors(story), story.skin, look(rest, 0, 0, size), across=sideways, down=below, grips=grips
+            rest,
+            colors(run.body, story.material),
+            story.skin,
+            look(rest, 0, 0, size),
+            across=sideways,
+            down=below,
+            grips=grips,
         ),
-        "from the side": particles(rest, colors(story), story.skin, flank, across=away, down=below),
+        "from the side": particles(rest, colors(run.body, story.material), story.skin, flank, across=away, down=below),
         "cut open at the grip": particles(
-            rest, colors(story), skin(run.body, cut), flank, across=away, down=below, grips=grips
+            rest, colors(run.body, story.material), skin(run.body, cut), flank, across=away, down=below, grips=grips
         ),
     }
     return views
@@ -97,12 +105,11 @@ def material_views(story: Story, size: tuple[int, int]) -> dict[str, str]:
     return found
 
 
-def section(story: Story) -> np.ndarray:
+def section(body: Body, motion: Motion) -> np.ndarray:
     """Particles in a slab through the grip, or through the middle, (P,) bool."""
-    run = story.run
-    x = run.body.rest[:, 0]
-    at = run.motion.center_rest[0, 0] if len(run.motion.radius) else np.median(x)
-    return np.abs(x - at) <= 1.25 * run.body.spacing
+    x = body.rest[:, 0]
+    at = motion.center_rest[0, 0] if len(motion.radius) else np.median(x)
+    return np.abs(x - at) <= 1.25 * body.spacing
 
 
 def side_film(story: Story, size: tuple[int, int], **how) -> Film:
@@ -113,10 +120,10 @@ def side_film(story: Story, size: tuple[int, int], **how) -> Film:
     top = max(float(moved.max()), 1e-9)
     both = np.concatenate([rest, *position[:: max(len(position) // 8, 1)]])
     oblique, flank = look(both, 40, 25, size), look(both, 90, 0, size)
-    cut = section(story)
+    cut = section(run.body, run.motion)
     panels = {
         "turned by 40° and lifted by 25°; held particles in pink": _frames(
-            position, np.broadcast_to(colors(story), position.shape), story.skin, oblique
+            position, np.broadcast_to(colors(run.body, story.material), position.shape), story.skin, oblique
         ),
         "cut open at the grip, seen from the side: how far each particle has moved": _frames(
             position, mapped(moved, 0, top, MOVED).astype(float), skin(run.body, cut), flank

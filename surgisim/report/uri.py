@@ -11,6 +11,11 @@ def data_uri(content: bytes, kind: str) -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
+def content(uri: str) -> bytes:
+    """What such an address carries."""
+    return base64.b64decode(uri.partition(";base64,")[2], validate=True)
+
+
 def jpeg(rgb: np.ndarray, quality: int = 88) -> str:
     """A photograph, sRGB, (H, W, 3) uint8."""
     return data_uri(_encoded(".jpg", rgb, [cv2.IMWRITE_JPEG_QUALITY, quality]), "image/jpeg")

@@ -1,19 +1,11 @@
 """Pages link to nothing that is not there."""
 
-import re
 from pathlib import Path
 
 import pytest
+from links import dead
 
 ROOT = Path(__file__).parents[2]
-ADDRESS = re.compile(r"""(?:href|src)="([^"#]+)""")
-
-
-def dead(page: Path) -> list[str]:
-    """Relative addresses on a page that lead nowhere."""
-    addresses = ADDRESS.findall(page.read_text())
-    near = [a for a in addresses if not a.startswith(("data:", "http:", "https:"))]
-    return [a for a in near if not (page.parent / a).exists()]
 
 
 @pytest.mark.parametrize("page", sorted((ROOT / "docs").rglob("*.html")), ids=lambda p: str(p.relative_to(ROOT)))

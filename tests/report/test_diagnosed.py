@@ -217,3 +217,12 @@ def test_the_stage_writes_the_page(tmp_path):
     command += ["--recording", made / "recording", "--page", made / "diagnosis.html"]
     assert subprocess.run(list(map(str, command)), timeout=120).returncode == 0
     assert json.loads((made / "diagnosis.json").read_text())["words"][:20] in (made / "diagnosis.html").read_text()
+
+
+def test_the_page_says_with_which_settings_and_code_it_was_diagnosed(tmp_path):
+    told = diagnosis() | {"header": {"settings": {"grid": 0.165}, "code": "abcdef0123456789"}}
+    folder = made_up.case(tmp_path, extra=2e-3, told=told)
+    case = read(folder / "recording", folder / "diagnosis.json", folder / "mismatch.npz", folder / "physics.json")
+    text = page(case, case.made()).decode()
+    assert "&#34;grid&#34;: 0.165" in text
+    assert "abcdef0123456789" in text

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import Browser, installed
+from links import dead
 from proof import made_up
 from report.made_up import invent
 from slab import slab
@@ -40,6 +41,7 @@ from surgisim.report.thumbnail import thumbnail
 from surgisim.report.views import DARKEST, balls, look, surface
 from surgisim.skin import skin
 
+ROOT = Path(__file__).parents[2]
 COST = {"masking": {"seconds": 12.5, "peak_mb": 345.0}, "depth": {"seconds": 3.0}}
 LOST = Motion(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 12, 3)), np.zeros((0, 12), bool), np.zeros(0), "none")
 NAMES = [f.name for f in dataclasses.fields(Run) if f.name not in ("truth", "found")]
@@ -149,8 +151,24 @@ def test_the_summary_marks_the_best_of_a_row(made):
     assert row["best"] == ["main"]
     assert table(runs)["made_up"]["masking.tool_iou"]["best"] == []
     text = summary(runs).decode()
-    assert "elastic/report/report.html" in text
     assert 'class="best"' in text
+
+
+def test_the_summary_links_to_where_the_rules_leave_reports(made, tmp_path):
+    rules = "".join(path.read_text() for path in (ROOT / "workflow" / "rules").glob("*.smk"))
+    assert '"results/{clip}/{variant}/report/report.html"' in rules
+    assert '"results/summary.html"' in rules
+    metrics = story(made).metrics
+    page = tmp_path / "results" / "summary.html"
+    page.parent.mkdir()
+    page.write_bytes(summary([metrics, dataclasses.replace(metrics, variant="elastic")]))
+    assert set(dead(page)) == {
+        f"{metrics.clip}/{variant}/report/report.html" for variant in (metrics.variant, "elastic")
+    }
+    for report in dead(page):
+        (page.parent / report).parent.mkdir(parents=True)
+        (page.parent / report).touch()
+    assert dead(page) == []
 
 
 def score_with(metrics: Metrics, group: str, name: str, factor: float) -> Metrics:

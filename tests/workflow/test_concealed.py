@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from cheap_tree import Tree
+from links import dead
 
 ROOT = Path(__file__).parents[2]
 JOB = re.compile(r"^(?:local)?rule (\w+):\n(?:    input: (.*)\n)?(?:    output: (.*)\n)?", re.M)
@@ -142,7 +143,8 @@ def test_a_run_is_invented_sealed_diagnosed_opened_and_scored(tmp_path):
     assert board["cases"][0]["verdict"] == "named"
     files = [out / name for name in ("0/sealed/truth.json", "seals.txt", "0/main/diagnosis.json", "0/main/score.json")]
     assert sorted(files, key=lambda path: path.stat().st_mtime_ns) == files
-    assert (out / "main" / "../0/main/diagnosis.html").resolve().is_file()
+    assert "../0/main/diagnosis.html" in (out / "main" / "scoreboard.html").read_text()
+    assert dead(out / "main" / "scoreboard.html") == []
     assert not tree.plan("blind") - {("blind",)}
     # One more case: what was diagnosed stays.
     tree.choices = {**tree.choices, "cases": 2}

@@ -188,6 +188,8 @@ CONCEALED |= {
     "interval_coverage",
     "clip_table",
     "clip_pictures",
+    "diagnosis_picture",
+    "gallery",
     "known",
     "known_direct",
     "known_score",
@@ -210,7 +212,7 @@ AGAIN = {
 }
 """Rules that run the module of another's name."""
 ASKED_FOR = {"blind", "blind_shuffled", "blind_ablations", "blind_phases", "blind_pooled", "blind_real"}
-ASKED_FOR |= {"clip_diagnoses", "coverage", "real_clips", "pictures"}
+ASKED_FOR |= {"clip_diagnoses", "coverage", "real_clips", "pictures", "kept_pictures"}
 TAKEN_OVER = {"body", "body_again"}
 """The rule `invent` with other files: bodies whose answers are known to whoever develops."""
 """Rules without a stage of their own: what `snakemake NAME` makes."""

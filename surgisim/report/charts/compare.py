@@ -13,13 +13,15 @@ def compare(values: dict[str, dict[str, float]], variants: list[str]) -> str:
     with sheet(6.0, 0.95 + 0.2 * len(variants) + 0.36 * len(values)) as figure:
         axes = figure.subplots()
         axes.grid(axis="y", visible=False)
+        named: set[str] = set()
         for row, numbers in enumerate(values.values()):
             axes.axhline(row, color=LINE, lw=1, zorder=1)
-            shift = np.linspace(-0.2, 0.2, max(len(variants), 2))
+            shift = np.linspace(-0.2, 0.2, len(variants)) if len(variants) > 1 else [0.0]
             for k, variant in enumerate(variants):
                 if variant in numbers:
                     color = COLORS[k % len(COLORS)]
-                    label = variant if row == 0 else None
+                    label = None if variant in named else variant
+                    named.add(variant)
                     axes.plot(numbers[variant], row + shift[k], "o", ms=6.5, color=color, label=label, mec="white")
         axes.set_yticks(range(len(values)), list(values), color=INK)
         axes.set_ylim(len(values) - 0.5, -0.5)

@@ -14,6 +14,7 @@ from surgisim.artifacts.verdict import PULLED, Marker, Verdict, read_verdict
 from surgisim.problem import Problem
 from surgisim.recordings.folder import read_recording
 from surgisim.recordings.recording import Recording
+from surgisim.report.made import Made, made
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,12 @@ class Diagnosed:
     """physics.json as it stands."""
     experiment: dict[str, Any] = field(default_factory=dict)
     """"center" and "pull" [m] of the separating experiment, where the diagnosis gives them."""
+    header: dict[str, Any] = field(default_factory=dict)
+    """Of diagnosis.json, where this project wrote it: settings and digest of the code."""
+
+    def made(self) -> Made:
+        """How the diagnosis was made, and by what its page is."""
+        return made({"diagnosis": self.header.get("settings", {})}, {"diagnosis": self.header.get("code", "not known")})
 
     @property
     def shown(self) -> tuple[Marker, ...]:
@@ -88,7 +95,14 @@ def read(recording: Path, diagnosis: Path, mismatch: Path, physics: Path) -> Dia
             f"{clip.frames}. Diagnose anew."
         )
     told = json.loads(diagnosis.read_text())
-    return Diagnosed(clip, verdict, left, json.loads(physics.read_text()), told.get("experiment") or _pull(verdict))
+    return Diagnosed(
+        clip,
+        verdict,
+        left,
+        json.loads(physics.read_text()),
+        told.get("experiment") or _pull(verdict),
+        told.get("header", {}),
+    )
 
 
 PULL = re.compile(r"(?:near|at \w+) \(([-\d., ]+?)(?:\) mm| mm\)), pull ([\d.]+) mm .*?along \(([-\d., ]+)\)")
