@@ -1,6 +1,7 @@
 # make demo              set up once, run the whole graph on the embedded clip, say where the report is
 # make demo VIDEO=clip.mp4 [OUT=folder]    the same on your own clip
-# make test              all but the slow tests;  make test-all, make lint   what CI runs
+# make test              all but the slow tests;  make test-slow   those;  make test-all   both
+# make lint              style; CI runs all of these
 # make config            rewrite config/config.yaml and config/schemas/ from the settings models, envs/ from the lock
 # make lock              choose the newest fitting versions anew and write requirements.txt; then make config
 
@@ -8,7 +9,7 @@ BIN := .venv/bin
 OUT ?= .
 ARGS ?=
 
-.PHONY: demo test test-all lint config lock setup clean
+.PHONY: demo test test-slow test-all lint config lock setup clean
 .DEFAULT_GOAL := demo
 
 setup:
@@ -22,6 +23,9 @@ PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 test: setup
 	@$(PYTEST) -m "not slow" $(ARGS)
+
+test-slow: setup
+	@$(PYTEST) -m slow $(ARGS)
 
 test-all: setup
 	@$(PYTEST) $(ARGS)

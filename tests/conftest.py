@@ -22,7 +22,14 @@ def shared() -> Path:
     return SHARED
 
 
+SLOW = 15
+"""What a slow test takes that does not say how long it does [s]: `@pytest.mark.slow(seconds)`."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files with the most slow tests first, so that no worker is left alone with them at the end."""
-    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
-    items.sort(key=lambda item: -slow[item.path])
+    """The longest files first, so that no worker is left alone with one at the end."""
+    long: Counter[Path] = Counter()
+    for item in items:
+        if marker := item.get_closest_marker("slow"):
+            long[item.path] += marker.args[0] if marker.args else SLOW
+    items.sort(key=lambda item: -long[item.path])

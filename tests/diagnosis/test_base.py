@@ -168,7 +168,7 @@ def let_go_late():
     return recording(fps=QUICK, late=LATE, sigma=4e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(100)
 def test_a_release_that_falls_between_frames_is_found_and_the_stiffness_with_it(let_go_late):
     case = case_of(let_go_late)
     # A softer body that lets go a little earlier looks nearly alike; one held to another moment is off by .5 and more.
@@ -186,7 +186,7 @@ def test_a_release_taken_to_fall_elsewhere_gives_another_body_that_fits_worse(le
     assert chi[1] > chi[0] + 100
 
 
-@pytest.mark.slow
+@pytest.mark.slow(120)
 def test_tissue_of_a_finer_grid_is_not_taken_for_a_stiffer_one():
     made = recording(fps=QUICK, sigma=4e-5, share=FINER * GRID)
     # A camera that may drift would make up for a part of it.

@@ -51,6 +51,7 @@ def test_deep_inside_nothing_is_said():
     assert outward(body(thick, boxes=False), Place((0.0, 0.0, 0.06), 0.003), np.array([0, 0, 1.0])) == 0.0
 
 
+@pytest.mark.slow(80)
 def test_what_draws_tissue_outward_is_not_called_a_contact():
     settings = Diagnosing(grid=GRID, replay=GRID, nulls=8, experiment=False, free=0, second=False, refine=1)
     push = {"hidden_contact": {"force": 0.12, "yaw": 0.3, "pitch": 0.2, "onset": 0.7, "end": 1.4}}

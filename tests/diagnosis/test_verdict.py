@@ -76,6 +76,7 @@ def test_a_law_with_which_the_frames_held_out_are_farther_off_is_not_named(monke
     assert "gravity" not in physics.terms
 
 
+@pytest.mark.slow(85)
 def test_nuisances_larger_than_they_ever_are_are_something_hidden(bare, monkeypatch):
     found, *_ = bare
     assert found.global_test["nuisance_ratio"] < 1.0

@@ -110,6 +110,7 @@ def swinging():
     return case
 
 
+@pytest.mark.slow(110)
 def test_a_strip_is_told_from_the_block_it_lies_on(swinging):
     found = estimate(*swinging, Estimation(**QUICK | {"iterations": 1}), silent)
     costs = {h["as"]: h["cost"] for h in found.fit.history if h["round"] == "hold" and "grip" not in h}

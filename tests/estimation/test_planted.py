@@ -78,7 +78,7 @@ def test_a_still_clip_is_called_still():
     assert "Nothing moves in this clip" in estimate(*case, Estimation(**QUICK), silent)[2].words
 
 
-@pytest.mark.slow
+@pytest.mark.slow(90)
 def test_frames_held_out_are_never_looked_at():
     case, settings = clip(), Estimation(**QUICK | {"iterations": 1})
     first = estimate(*case, settings, silent)

@@ -160,7 +160,7 @@ def test_a_run_is_invented_sealed_diagnosed_opened_and_scored(tmp_path):
     assert not (out / "0" / "main" / "score.json").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.slow(600)
 def test_three_real_cases_go_from_their_seal_to_a_score(tmp_path):
     for name in ("surgisim", "stages", "workflow", "config", "envs"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
