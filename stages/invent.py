@@ -26,8 +26,10 @@ FILES = {
 def main(*, settings: Invent, progress):
     from surgisim.phantom import seal
     from surgisim.phantom.blind import invent
+    from surgisim.phantom.families.blind import invent as of_family
 
-    made, salt = invent(settings, progress), seal.salt()
+    made = invent(settings, progress) if settings.family == "blocks" else of_family(settings, progress)
+    salt = seal.salt()
     public = [made.recording[f"{name}{suffix}"] for name, suffix in list(FILES.items())[:6]]
     return *public, seal.seal(made.truth, salt).encode(), made.truth, made.tracks, salt.encode()
 

@@ -1,10 +1,13 @@
 """Settings of the blind generators: one concealed recording, or one clip, of a seed."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from surgisim.config.base import Settings
+
+FAMILIES = ("tetrahedra", "springs")
+"""Of surgisim/phantom/families, by what computes them."""
 
 
 class Concealing(Settings):
@@ -31,6 +34,9 @@ class Concealing(Settings):
 
 
 class Invent(Concealing):
+    family: Literal["blocks", "tetrahedra", "springs"] = "blocks"
+    """What computes it: blocks of finite elements, with the choices below; or a family of surgisim/phantom/families,
+    which draws all of them but `only` by itself [name]."""
     fps: float = Field(25.0, gt=0)
     """Frames per second [1/s]."""
     points: int = Field(200, ge=1)

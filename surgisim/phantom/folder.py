@@ -45,7 +45,7 @@ def recording(
     span = {"fit": [0, scene.split], "held_out": [scene.split, scene.frames]}
     return {
         "recording.json": _json(told),
-        "rest.ply": _ply(vertices, faces),
+        "rest.ply": ply(vertices, faces),
         "fixed.json": _json({"boxes": [base(scene, plate)]}),
         "grip.npz": npz(center_rest=center, radius=radius, position=position, active=active),
         "tracks.npz": npz(points=points, visible=visible, sigma=np.full(len(points), sigma)),
@@ -107,7 +107,7 @@ def _json(body: dict) -> bytes:
     return (json.dumps(body, indent=1, allow_nan=False) + "\n").encode()
 
 
-def _ply(vertices: np.ndarray, faces: np.ndarray) -> bytes:
+def ply(vertices: np.ndarray, faces: np.ndarray) -> bytes:
     head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
     head += [f"property double {a}" for a in "xyz"]
     head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]

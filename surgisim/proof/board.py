@@ -16,6 +16,8 @@ from surgisim.proof.shares import median, share
 FORMAT = "surgisim-scoreboard/1"
 STRONG = 3.0
 """Signal-to-noise ratio from which the goals count."""
+EVIDENT = 25.0
+"""Log evidence that an oracle has (phantom/families/oracle.py) from which they do."""
 RATIOS = (0.0, 1.5, 3.0, float("inf"))
 Case = dict[str, Any]
 
@@ -74,8 +76,16 @@ def pooled(boards: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def strong(cases: list[Case]) -> list[Case]:
-    """Those with nothing concealed, and those whose effect stands out of the noise."""
-    return [c for c in cases if c["kind"] == "nothing" or c["snr"] >= STRONG]
+    """Those with nothing concealed, and those whose effect stands out of the noise: to an oracle, where that is known.
+
+    A ratio of RMS does not compare across generators; log evidence with base and nuisances projected out does.
+    """
+
+    def shows(case: Case) -> bool:
+        surely = case.get("log_evidence")
+        return case["snr"] >= STRONG if surely is None else surely >= EVIDENT
+
+    return [c for c in cases if c["kind"] == "nothing" or shows(c)]
 
 
 def weaker(cases: list[Case]) -> list[Case]:

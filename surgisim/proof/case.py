@@ -39,6 +39,8 @@ def score(
         "concealed": [_concealed(e) for e in truth.effects],
         "snr": told["snr"],
         "snr_held_out": told["snr_held_out"],
+        "log_evidence": told.get("log_evidence"),
+        "family": told.get("family", "blocks"),
         "snr_set": told.get("snr_set", told["snr"]),
         "scale": told.get("scale", 1.0),
         "noise": told["noise"],

@@ -45,7 +45,12 @@ def parameters(concealed: dict, effect: Effect, base: dict[str, float]) -> list[
         given = effect.parameters.get(name)
         if given is None:
             continue
-        true, low, high = make(told, base), given.get("low"), given.get("high")
+        try:
+            true = make(told, base)
+        except KeyError:
+            # A generator whose law has no such number.
+            continue
+        low, high = given.get("low"), given.get("high")
         rows.append(
             {
                 "term": concealed["term"],

@@ -1,12 +1,13 @@
 """Recordings that conceal some physics: invented, sealed, diagnosed, and only then opened and scored.
 
 `snakemake blind --config cases=40 seed=7`. What they conceal lies in sealed/, which the rule `score` alone reads.
-With tier=video a case is an mp4, which goes through the whole graph before what became of it is diagnosed.
+With tier=video a case is an mp4, which goes through the whole graph before what became of it is diagnosed; with the
+name of a family (surgisim/phantom/families) as tier, another solver's bodies, grips, cameras and noise.
 """
 
 
 wildcard_constraints:
-    seed=r"(video-)?\d+",
+    seed=rf"(video-|{'|'.join(f'{name}-' for name in FAMILIES)})?\d+",
     case=r"\d+",
     way="|".join(WAYS),
     shorter="|".join(SHORTER),
@@ -30,7 +31,7 @@ rule invent:
     benchmark:
         "benchmarks/blind/{seed}/{case}/invent.tsv"
     wildcard_constraints:
-        seed=r"\d+",
+        seed=rf"({'|'.join(f'{name}-' for name in FAMILIES)})?\d+",
     conda:
         "../../envs/physics.yaml"
     resources:

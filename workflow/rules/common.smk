@@ -13,7 +13,7 @@ from surgisim.clips import Clip, invented
 from surgisim.config.base import parse as checked
 from surgisim.config.containers import Containers
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.config.invent import Invent, InventClip
+from surgisim.config.invent import FAMILIES, Invent, InventClip
 from surgisim.config.study import PARTS as STUDIED
 from surgisim.config.whole import PARENTS
 from surgisim.digest import digest
@@ -39,7 +39,12 @@ BLIND = (
 )
 
 # Concealed recordings (blind.smk): what is seen of them, which seed (several on one board: `seeds`), and how many cases.
-TIERS = {"tracks": "", "video": "video-"}
+# Tracks come of our own blocks of elements, or of a family of generators.
+TIERS = {
+    "tracks": "",
+    "video": "video-",
+    **{family: f"{family}-" for family in FAMILIES},
+}
 TIER = config.get("tier", "tracks")
 if TIER not in TIERS:
     raise WorkflowError(f"config key 'tier' is {TIER!r}; {list(TIERS)} are known.")
@@ -254,7 +259,10 @@ def inventing(w):
         "seed": number(getattr(w, "seed", SEED)),
         "case": int(w.case),
     }
-    kind = InventClip if TIER == "video" else Invent
+    family = str(getattr(w, "seed", "")).rpartition("-")[0]
+    if family in FAMILIES:
+        told["family"] = family
+    kind = InventClip if family == "video" else Invent
     try:
         return json.dumps(checked(kind, told, "config key 'invent'").model_dump())
     except Problem as problem:
@@ -317,7 +325,7 @@ def number(seed):
 
 def others(w):
     """The files of the recording whose paths this case gets when they are shuffled."""
-    other = partner(int(w.case), COUNT, int(w.seed))
+    other = partner(int(w.case), COUNT, number(w.seed))
     return [f"blind/{w.seed}/{other}/recording/{name}" for name in FILES]
 
 

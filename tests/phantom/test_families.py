@@ -1,0 +1,259 @@
+"""Families of invented recordings: bodies that are sound, solvers that obey physics, effects that act, nothing told."""
+
+import dataclasses
+import io
+import json
+
+import numpy as np
+import pytest
+
+from surgisim.config.invent import FAMILIES, Invent
+from surgisim.phantom.families import bodies, stepping
+from surgisim.phantom.families import seen as seeing_of
+from surgisim.phantom.families.blind import concealed, invent, recording
+from surgisim.phantom.families.hidden import KINDS
+from surgisim.phantom.families.oracle import evidence
+from surgisim.phantom.families.solvers import solver
+from surgisim.phantom.families.solvers.springs import Springs
+from surgisim.phantom.families.solvers.tetrahedra import Tetrahedra, shapes
+from surgisim.phantom.families.world import Grip, Material, World, draw
+from surgisim.recordings.folder import read_recording
+
+MODELS = {"tetrahedra": Tetrahedra, "springs": Springs}
+
+
+def test_every_family_that_may_be_asked_for_has_a_solver():
+    assert set(MODELS) == set(FAMILIES)
+    for name in FAMILIES:
+        assert set(solver(name).CONCEALS) <= set(KINDS)
+
+
+def generators(seed: int):
+    return lambda part: np.random.default_rng([seed, *part.encode()])
+
+
+def block(material: Material | None = None, grips: tuple[Grip, ...] = (), frames: int = 9, fps: float = 20.0) -> World:
+    """A slab on a plate with a few probes."""
+    body = bodies.draw(np.random.default_rng(0), "slab", "plate", 0.5)
+    probes = np.arange(0, len(body.upper), 7)
+    weights = np.full((len(probes), 3), 1 / 3)
+    material = material or Material(4e3, 0.45, 20.0, 1000.0)
+    return World(body, material, grips, fps, frames, frames - 2, None, probes, weights)
+
+
+def grip(world: World, **changed) -> Grip:
+    k = world.body.upper[len(world.body.upper) // 2, 0]
+    told = {
+        "center": world.body.points[k], "radius": 0.006, "pull": 0.003 * world.body.out[k], "aside": np.zeros(3),
+        "course": "straight", "handling": "carried", "begin": 1, "arrive": 4, "release": 6, "early": 0.0, "late": 0.0,
+    }  # fmt: skip
+    return Grip(**told | changed)
+
+
+@pytest.mark.parametrize(("kind", "support"), [(k, s) for k, all_of in bodies.SUPPORTS.items() for s in all_of])
+def test_a_body_is_closed_and_its_boxes_hold_what_is_held(kind, support):
+    for seed in range(3):
+        body = bodies.draw(np.random.default_rng(seed), kind, support, 0.35)
+        assert body.volume.min() > 0
+        a, b, c = np.moveaxis(body.points[body.skin], 1, 0)
+        assert (np.cross(a, b) * c).sum() / 6 == pytest.approx(body.volume.sum(), rel=1e-9)
+        edges = np.sort(np.concatenate([body.skin[:, [0, 1]], body.skin[:, [1, 2]], body.skin[:, [2, 0]]]), 1)
+        assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+        inside = [((body.points >= b["min"]) & (body.points <= b["max"])).all(1) for b in body.boxes]
+        assert (np.any(inside, 0) == body.held).all()
+        assert body.held.any()
+        assert not body.held[body.upper].all()
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_nothing_moves_or_pushes_at_rest_nor_after_a_turn(name):
+    points = MODELS[name](block(), {})
+    still = np.zeros_like(points.rest)
+    scale = 4e3 * 0.01**2
+    assert np.abs(points.push(points.rest, still, 0.0, 0.01, False)).max() < 1e-9 * scale
+    turn = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    assert np.abs(points.push(points.rest @ turn.T + 0.02, still, 0.0, 0.01, False)).max() < 1e-9 * scale
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_forces_balance_and_turn_nothing(name):
+    """Third law: sums of forces and of torques are nothing, whatever the tissue remembers."""
+    world = block()
+    hidden = {n: KINDS[n].draw(world_with_grip(), np.random.default_rng(2), n) for n in solver(name).CONCEALS}
+    inner = ("stiff_inclusion", "fibre", "stiffening", "relaxation", "plastic_set", "damage")
+    points = MODELS[name](world, {n: hidden[n].scaled(KINDS[n].start) for n in inner})
+    rng = np.random.default_rng(3)
+    x = points.rest + 4e-4 * rng.standard_normal(points.rest.shape)
+    v = 1e-3 * rng.standard_normal(points.rest.shape)
+    for keep in (True, False):
+        force = points.push(x, v, 0.5, 0.01, keep)
+    assert np.abs(force.sum(0)).max() < 1e-9 * np.abs(force).sum()
+    assert np.abs(np.cross(x, force).sum(0)).max() < 1e-9 * np.abs(np.cross(x, force)).sum()
+
+
+def world_with_grip() -> World:
+    world = block()
+    return dataclasses.replace(world, grips=(grip(world),))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_matrix_at_rest_is_the_slope_of_the_forces(name):
+    points = MODELS[name](block(), {})
+    stiff, damping = points.tangent()
+    rng = np.random.default_rng(4)
+    way = rng.standard_normal(points.rest.shape)
+    still, tiny = np.zeros_like(way), 1e-8
+    by_hand = (points.push(points.rest - tiny * way, still, 0.0, 0.01, False)
+               - points.push(points.rest + tiny * way, still, 0.0, 0.01, False)) / (2 * tiny)  # fmt: skip
+    assert stiff @ way.ravel() == pytest.approx(by_hand.ravel(), abs=1e-4 * np.abs(by_hand).max())
+    by_hand = -points.push(points.rest, way, 0.0, 0.01, False)
+    assert damping @ way.ravel() == pytest.approx(by_hand.ravel(), abs=1e-9 * np.abs(by_hand).max())
+
+
+def stretched(points, share: float) -> np.ndarray:
+    """Internal energy's slope along a uniform stretch, over its volume: the stress [Pa]."""
+    F = np.diag([1 + share, 0, 0]) + np.diag([0, 1, 1])
+    x = points.rest @ F.T
+    force = points.push(x, np.zeros_like(x), 0.0, 0.01, False)
+    return -np.einsum("ni,nj->ij", force, points.rest)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_small_stretch_meets_the_elastic_constants(name):
+    """Virial stress of a uniform uniaxial strain: lambda + 2 mu along, lambda across."""
+    law = Material(4e3, 0.45, 0.0, 1000.0)
+    points = MODELS[name](block(law), {})
+    volume = points.mass.sum() / law.density
+    stress = stretched(points, 1e-5) / volume / 1e-5
+    lam = law.bulk - 2 * law.mu / 3
+    # Springs of finitely many directions are not alike along all axes.
+    close = 1e-3 if name == "tetrahedra" else 0.25
+    assert stress[0, 0] == pytest.approx(lam + 2 * law.mu, rel=close)
+    assert stress[1, 1] == pytest.approx(lam, rel=close)
+
+
+def test_shape_functions_are_one_at_their_node_and_sum_to_one():
+    nodes = np.concatenate([np.eye(4), [[0.5 * (k in e) for k in range(4)] for e in
+                                        ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))]])  # fmt: skip
+    assert shapes(nodes) == pytest.approx(np.eye(10))
+    assert shapes(np.random.default_rng(0).dirichlet(np.ones(4), 5)).sum(1) == pytest.approx(1)
+
+
+def test_a_layer_that_is_let_go_swings_at_its_own_frequency():
+    """Steps: a column that shears freely swings at sqrt(mu / rho) / (4 h); the steps keep it."""
+    law = Material(2e3, 0.3, 0.0, 1000.0)
+    world = block(law, frames=80, fps=2000.0)
+    points = Tetrahedra(world, {})
+    thick = world.body.thickness
+    body = stepping._Moving(points, world, {})
+    away = np.abs((points.rest - points.rest[points.held].mean(0)) @ stepping._normal(world))
+    side = np.roll(stepping._normal(world), 1)
+    swing = np.outer(np.sin(np.pi * away / (2 * thick)), side)
+    body.x = [points.rest + 2e-5 * swing] * 2
+    course = []
+    for t in range(1, world.frames):
+        body.frame(t)
+        course.append(float((points.mass[:, None] * swing * (body.x[0] - points.rest)).sum()))
+    crossing = np.flatnonzero(np.diff(np.sign(course)))[0]
+    quarter = (crossing + 1 + course[crossing] / (course[crossing] - course[crossing + 1])) / world.fps
+    # A finite block bends a little besides.
+    assert quarter == pytest.approx(thick / np.sqrt(law.mu / law.density), rel=0.15)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_everything_that_can_be_hidden_moves_the_body_and_nothing_at_magnitude_zero(name):
+    engine = solver(name)
+    world = dataclasses.replace(world_with_grip(), frames=11, split=9)
+    plain = engine.paths(world, ())
+    rng = np.random.default_rng(5)
+    for effect in engine.CONCEALS:
+        hidden = KINDS[effect].draw(world, rng, effect)
+        if hidden.onset is not None:
+            hidden = dataclasses.replace(hidden, onset=0.0, end=None if hidden.end is None else 0.6)
+        if "jerks" in hidden.numbers:
+            hidden = dataclasses.replace(hidden, numbers={"jerks": [0.2]})
+        assert (engine.paths(world, (hidden.scaled(0.0),)) == plain).all(), effect
+        moved = engine.paths(world, (hidden.scaled(0.5 * KINDS[effect].most),))
+        assert np.abs(moved - plain).max() > 2e-6, effect
+
+
+def test_steps_half_as_long_change_little(monkeypatch):
+    world = world_with_grip()
+    long = solver("tetrahedra").paths(world, ())
+    monkeypatch.setattr(stepping, "LONGEST", 0.25 * stepping.LONGEST)
+    short = solver("tetrahedra").paths(world, ())
+    assert np.abs(long - short).max() < 0.03 * np.abs(short - short[:, :1]).max()
+
+
+def test_worlds_differ_in_everything_and_an_axis_tells_nothing_of_another():
+    worlds = [draw(generators(seed)) for seed in range(40)]
+    for told in (
+        {w.body.kind for w in worlds}, {g.course for w in worlds for g in w.grips},
+        {g.handling for w in worlds for g in w.grips}, {len(w.grips) for w in worlds},
+    ):  # fmt: skip
+        assert len(told) >= 3
+    assert min(w.fps for w in worlds) < 15 < 40 < max(w.fps for w in worlds)
+    assert min(len(w.probes) for w in worlds) < 60 < 250 < max(len(w.probes) for w in worlds)
+    # The same parts, whatever another part's generator gives.
+    other = draw(lambda part: np.random.default_rng([0 if part != "material" else 99, *part.encode()]))
+    assert (other.body.points == worlds[0].body.points).all()
+    assert other.material != worlds[0].material
+
+
+def test_evidence_is_the_chi_square_of_what_nothing_else_explains():
+    rng = np.random.default_rng(6)
+    rest, seen = rng.standard_normal((20, 3)), np.ones((20, 30), bool)
+    seeing = dataclasses.replace(seeing_of.draw(rng), sigma=1e-4, lasting=0.0, camera="still")
+    base = [rng.standard_normal((20, 30, 3)) for _ in range(2)]
+    assert evidence(2e-4 * base[0], base, rest, seen, seeing) == pytest.approx(0, abs=1e-12)
+    assert evidence(np.full((20, 30, 3), 3e-4), base, rest, seen, seeing) == pytest.approx(0, abs=1e-12)
+    d = 1e-4 * rng.standard_normal((20, 30, 3))
+    assert evidence(d, base, rest, seen, seeing) == pytest.approx(0.5 * 3 * 20 * 29, rel=0.06)
+    moved = np.cross(np.broadcast_to(rng.standard_normal((1, 30, 3)), d.shape), (rest - rest.mean(0))[:, None])
+    shaken = dataclasses.replace(seeing, camera="walk")
+    assert evidence(1e-4 * moved, base, rest, seen, shaken) == pytest.approx(0, abs=1e-9)
+
+
+def test_a_camera_that_stands_still_adds_noise_of_the_size_that_is_said():
+    world = block()
+    true = np.repeat(world.rest[:, None], 200, 1)
+    seeing = dataclasses.replace(seeing_of.draw(np.random.default_rng(7)), camera="still", offset=0.0, swapped=0.0)
+    off = seeing_of.observed(world, true, seeing, np.random.default_rng(8)) - true
+    assert off.std() == pytest.approx(seeing.sigma, rel=0.1)
+
+
+def test_twenty_cases_hold_the_whole_mixture_and_every_law_comes_before_one_comes_again():
+    engine = solver("springs")
+    names = [concealed(Invent(family="springs", seed=3, case=case), engine) for case in range(40)]
+    assert sum(n is None for n in names) == 12
+    inside = [n for n in names if n and not KINDS[n].outside]
+    assert len(inside) == 20
+    assert len(set(inside[:12])) == 12
+
+
+@pytest.mark.slow(60)
+@pytest.mark.parametrize("family", MODELS)
+def test_a_case_is_a_recording_that_can_be_read_and_the_same_every_time(family, tmp_path):
+    case = next(c for c in range(20) if concealed(Invent(family=family, seed=11, case=c), solver(family)) is None)
+    settings = Invent(family=family, seed=11, case=case)
+    made = invent(settings)
+    assert made == invent(settings)
+    for name, content in made.recording.items():
+        (tmp_path / name).write_bytes(content)
+    clip = read_recording(tmp_path)
+    told = json.loads(made.truth)
+    assert (told["kind"], told["family"], told["recording"]) == ("nothing", family, clip.name)
+    with np.load(io.BytesIO(made.tracks)) as paths:
+        off = np.nan_to_num(clip.points - paths["true"])[clip.visible]
+    assert np.median(np.abs(off)) < 4 * told["noise"]
+
+
+def test_what_is_recorded_does_not_depend_on_what_is_hidden():
+    world, seeing = world_with_grip(), seeing_of.draw(np.random.default_rng(9))
+    paths = np.repeat(world.rest[:, None], world.frames, 1)
+    free = np.ones(paths.shape[:2], bool)
+    first = recording(world, "r-1", paths, free, seeing)
+    second = recording(world, "r-1", paths + 1e-3, free, seeing)
+    assert [len(b) for b in first.values()] == [len(b) for b in second.values()]
+    assert [n for n in first if first[n] != second[n]] == ["tracks.npz"]
