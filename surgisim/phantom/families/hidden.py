@@ -205,7 +205,7 @@ KINDS: dict[str, Kind] = {
 
 
 def described(world: World, hidden: Hidden, own: bool) -> dict:
-    """What the truth says of it, in the words of a diagnosis; own: its magnitude means something in its solver alone."""
+    """What the truth says of it, in the words of a diagnosis; own: its magnitude is its solver's alone."""
     kind = KINDS[hidden.name]
     numbers = {
         f"own {kind.parameter}" if own else kind.parameter: {"value": kind.value(world, hidden), "unit": kind.unit}
