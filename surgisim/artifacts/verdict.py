@@ -93,6 +93,8 @@ class Verdict:
     goodness: Goodness | None = None
     untold: tuple[str, ...] = ()
     """Parameters that the recording does not tell."""
+    evidence: float | None = None
+    """Log evidence of the best law over nothing [1]."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -129,7 +131,13 @@ def read_verdict(path: Path) -> Verdict:
         nuisances(body, str(path)),
         goodness(body, str(path)),
         untold(body),
+        _evidence(body.get("global_test")),
     )
+
+
+def _evidence(test: Any) -> float | None:
+    found = test.get("log_evidence") if isinstance(test, dict) else None
+    return float(found) if isinstance(found, int | float) else None
 
 
 def millimetres(value: float, unit: str, where: str) -> float:

@@ -50,6 +50,7 @@ def score(
         "onsets": [o for e, named in _pairs(truth, verdict) if (o := onset(e, named, recording.fps))],
         "parameters": [row for e, named in _pairs(truth, verdict) for row in parameters(e, named, told["base"])],
         "held_out": held_out(truth, recording, verdict, mismatch),
+        "evidence": verdict.evidence,
         "detectable_above": verdict.detectable_above,
         "missing_phases": list(verdict.missing_phases),
         "words": verdict.words,

@@ -195,6 +195,7 @@ CONCEALED |= {
     "known_score",
     "known_board",
     "ablations",
+    "across",
     "recorded",
     "scene_score",
     "tables",
@@ -211,7 +212,7 @@ AGAIN = {
     "scene_again",
 }
 """Rules that run the module of another's name."""
-ASKED_FOR = {"blind", "blind_shuffled", "blind_ablations", "blind_phases", "blind_pooled", "blind_real"}
+ASKED_FOR = {"blind", "blind_across", "blind_shuffled", "blind_ablations", "blind_phases", "blind_pooled", "blind_real"}
 ASKED_FOR |= {"clip_diagnoses", "coverage", "real_clips", "pictures", "kept_pictures"}
 TAKEN_OVER = {"body", "body_again"}
 """The rule `invent` with other files: bodies whose answers are known to whoever develops."""

@@ -357,3 +357,45 @@ rule blind_ablations:
 rule blind_phases:
     input:
         f"blind/{room(SEED)}/phases.html",
+
+
+# One family of generators left out of what is learned, each in its turn: `snakemake blind_across --config cases=24 seed=7`.
+EVERY_FAMILY = ("blocks", *FAMILIES)
+
+
+rule across:
+    input:
+        boards=[
+            f"blind/{'' if family == 'blocks' else f'{family}-'}{{number}}/main/scoreboard.json"
+            for family in EVERY_FAMILY
+        ],
+    output:
+        table="blind/across/{number}.json",
+        page=report(
+            "blind/across/{number}.html",
+            caption="../report/scoreboard.rst",
+            category="concealed recordings",
+            labels={"seed": "{number}", "way": "one generator left out"},
+        ),
+    log:
+        "logs/blind/across/{number}.log",
+    benchmark:
+        "benchmarks/blind/across/{number}.tsv"
+    wildcard_constraints:
+        number=r"\d+",
+    conda:
+        "../../envs/report.yaml"
+    resources:
+        mem_mb=growing(1000),
+    params:
+        settings=json.dumps({"families": list(EVERY_FAMILY)}),
+        code=code("across"),
+    shell:
+        'python "$SURGISIM/stages/across.py" --boards {input.boards}'
+        " --table {output.table} --page {output.page}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+
+
+rule blind_across:
+    input:
+        f"blind/across/{SEED}.html",
