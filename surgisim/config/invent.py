@@ -6,7 +6,7 @@ from pydantic import Field
 
 from surgisim.config.base import Settings
 
-FAMILIES = ("tetrahedra", "springs")
+FAMILIES = ("tetrahedra", "springs", "lattice")
 """Of surgisim/phantom/families, by what computes them."""
 
 
@@ -34,7 +34,7 @@ class Concealing(Settings):
 
 
 class Invent(Concealing):
-    family: Literal["blocks", "tetrahedra", "springs"] = "blocks"
+    family: Literal["blocks", "tetrahedra", "springs", "lattice"] = "blocks"
     """What computes it: blocks of finite elements, with the choices below; or a family of surgisim/phantom/families,
     which draws all of them but `only` by itself [name]."""
     fps: float = Field(25.0, gt=0)
