@@ -175,7 +175,9 @@ def test_everything_that_can_be_hidden_moves_the_body_and_nothing_at_magnitude_z
         if "jerks" in hidden.numbers:
             hidden = dataclasses.replace(hidden, numbers={"jerks": [0.2]})
         assert (engine.paths(world, (hidden.scaled(0.0),)) == plain).all(), effect
-        moved = engine.paths(world, (hidden.scaled(0.2 * KINDS[effect].most),))
+        # What has a threshold shows beyond it alone.
+        share = 0.9 if effect in ("damage", "plastic_set") else 0.2
+        moved = engine.paths(world, (hidden.scaled(share * KINDS[effect].most),))
         assert np.abs(moved - plain).max() > 4e-7, effect
 
 
