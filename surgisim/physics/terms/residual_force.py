@@ -4,7 +4,7 @@
 
 F [N] is the whole of it, along x, y and z; X0 and r are the law's place, at rest; c(t) is physics/course.py's: it sets
 in, and stays, fades, ends or comes again and again. No cause is claimed: it stands for a load that no named law has,
-and is only as good as its prediction of frames that it was not fitted to. At a time that stands still it is conservative.
+and is only as good as its prediction of frames that it was not fitted to. While time stands still it conserves energy.
 The simplest source of a quasi-static misfit, as in traction force microscopy: Dembo and Wang, Stresses at the
 cell-to-substrate interface during locomotion of fibroblasts, Biophys. J. 76 (1999); the place and the course are ours.
 """

@@ -5,9 +5,9 @@
 T [Pa] is symmetric, a second Piola stress, and turns with the tissue; w is the share of the law's place (a blob, a
 layer, or 1 everywhere), c(t) physics/course.py's. It is the stress that holds back an eigenstrain e, T = -C : e with C
 the tissue's stiffness: -T with equal components along all axes is a lump that swells, a single component a thread that
-shortens. It has no net force and no net moment. No cause is claimed: it stands for a source of strain that no named law
-has. At a time that stands still psi = T : (F^T F - 1) / 2 is its energy [J/m^3].
-Mura, Micromechanics of Defects in Solids, 2nd ed. (1987), section 1: the eigenstrain; the place and the course are ours.
+shortens. It has no net force and no net moment. No cause is claimed: it stands for a source of strain that no named
+law has. While time stands still psi = T : (F^T F - 1) / 2 is its energy [J/m^3].
+Mura, Micromechanics of Defects in Solids, 2nd ed. (1987), section 1: the eigenstrain; place and course are ours.
 """
 
 from typing import Any
