@@ -18,3 +18,19 @@ class Character:
     """Whether it acts in one place; else in a layer or everywhere."""
     period: float | None = None
     """Of what comes again and again [s]."""
+
+
+@dataclass(frozen=True)
+class Truly:
+    """Which answers are right of something whose cause is known; empty where nothing is to be asked."""
+
+    at_rest: tuple[bool | None, ...] = ()
+    change: tuple[str | None, ...] = ()
+    energy: tuple[str, ...] = ()
+    local: tuple[bool, ...] = ()
+    periodic: tuple[bool, ...] = (False,)
+
+    def right(self, said: dict) -> dict[str, bool]:
+        """Of each question that is asked, whether `said`, a Character's fields, answers it rightly."""
+        answers = {**said, "periodic": said["period"] is not None}
+        return {name: answers[name] in wanted for name, wanted in vars(self).items() if wanted}

@@ -12,6 +12,7 @@ from surgisim.proof.naming import common, naming
 from surgisim.proof.numbers import parameters
 from surgisim.proof.places import onset, place
 from surgisim.proof.truth import Truth
+from surgisim.proof.unnamed import unnamed
 from surgisim.recordings.recording import Recording
 
 FORMAT = "surgisim-score/1"
@@ -30,6 +31,7 @@ def score(
             f"the truth is of {told['recording']}, the recording is {recording.name} and the diagnosis is of "
             f"{verdict.recording}. Score files of one case."
         )
+    errors = held_out(truth, recording, verdict, mismatch)
     return {
         "format": FORMAT,
         "recording": recording.name,
@@ -47,7 +49,8 @@ def score(
         "places": [p for e, named in _pairs(truth, verdict) if (p := place(e, named, cell))],
         "onsets": [o for e, named in _pairs(truth, verdict) if (o := onset(e, named, recording.fps))],
         "parameters": [row for e, named in _pairs(truth, verdict) for row in parameters(e, named, told["base"])],
-        "held_out": held_out(truth, recording, verdict, mismatch),
+        "held_out": errors,
+        "unnamed": unnamed(told["kind"], truth.names, verdict, errors),
         "detectable_above": verdict.detectable_above,
         "missing_phases": list(verdict.missing_phases),
         "words": verdict.words,

@@ -15,8 +15,8 @@ from surgisim.diagnosis.form import hats, knots
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.physics.course import NEVER, at
 
-KNOT = 0.12
-"""Time between the knots of a course [s]: the fastest rise that is tried."""
+KNOT = 0.2
+"""Time between the knots of the courses in a coarse search [s]; around its best, courses are followed exactly."""
 MOMENT = 0.2
 """Time between moments at which something sets in [s]."""
 RISES, FADES, LASTS = (0.12, 0.5, 1.2), (0.4, 1.2), (0.5, 1.0, 2.0)
@@ -66,8 +66,13 @@ def times(clip: Clip) -> np.ndarray:
 
 
 def bases(clip: Clip) -> np.ndarray:
-    """What the columns of a block follow in time, (B, T)."""
+    """What the columns of a coarse block follow in time, (B, T)."""
     return hats(times(clip), clip)
+
+
+def exactly(course: Course, clip: Clip) -> np.ndarray:
+    """A course over the fitted frames, (T,)."""
+    return course.on(clip.time[: clip.until])
 
 
 def tried(clip: Clip) -> list[Course]:

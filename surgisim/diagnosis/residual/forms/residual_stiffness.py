@@ -26,7 +26,7 @@ KINDS = {"shear": (0,), "bulk": (1,), "both": (0, 1), "strained": (2,)}
 """Which numbers a form has."""
 WIDTHS = (0.05, 0.2)
 """Squared strains over which stiffness changes with strain [1]."""
-DEPTHS = (0.15, 0.5)
+DEPTHS = (0.3,)
 """Shares of the depth below the observed side at which blobs are tried."""
 RISE = 0.15
 """How long a change from a moment on is tried to take [s]."""
@@ -74,23 +74,24 @@ def _always(look: Look, wheres: Sequence[Where], kinds: Sequence[str], widths: S
 
 
 def _from_a_moment(look: Look, where: Where, kinds: Sequence[str], onsets: Sequence[float], rise: float) -> Block:
-    near, bases, at = look.base.tangent, courses.bases(look.clip), courses.times(look.clip)
-    columns = [near.over_time(_states(look, where, k, WIDTHS[0]), c) for k in (0, 1) for c in bases]
-    eye, found = np.eye(2), []
+    near, time = look.base.tangent, look.clip.time[: look.clip.until]
+    shapes = [here_at(time, onset, rise) for onset in onsets]
+    columns = [near.over_time(_states(look, where, k, WIDTHS[0]), shape) for k in (0, 1) for shape in shapes]
+    eye, found = np.eye(len(columns)), []
     for kind in kinds:
         about = {"kind": kind, "width": WIDTHS[0], "rise": rise}
-        for onset in onsets:
-            mix = np.kron(eye[:, list(KINDS[kind])], here_at(at, onset, rise)[:, None])
-            found.append(Hypothesis(NAME, mix, 0, where.place, onset, None, about, where.scope))
+        for n, onset in enumerate(onsets):
+            mine = [n + k * len(onsets) for k in KINDS[kind]]
+            found.append(Hypothesis(NAME, eye[:, mine], 0, where.place, onset, None, about, where.scope))
     return Block(np.stack(columns), found)
 
 
 def tried(look: Look) -> Parts:
     wheres = [EVERYWHERE, *layers(look), *blobs(look, DEPTHS)]
     yield "other stiffness", lambda: iter([_always(look, wheres, [*KINDS], WIDTHS)])
-    for where in wheres:
+    for n, where in enumerate(wheres):
         yield (
-            f"stiffness from a moment on, {where.scope}",
+            f"stiffness from a moment on, {where.scope} {n}",
             lambda w=where: iter([_from_a_moment(look, w, ("shear", "both"), _onsets(look.clip), RISE)]),
         )
 

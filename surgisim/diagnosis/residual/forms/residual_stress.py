@@ -24,7 +24,7 @@ from surgisim.physics.terms.residual_stress import AXES, tensor
 NAME = "residual_stress"
 KINDS = {"pressure": np.array([[1.0], [1.0], [1.0], [0.0], [0.0], [0.0]]), "full": np.eye(6)}
 """From amplitudes to components."""
-DEPTHS = (0.2, 0.55)
+DEPTHS = (0.35,)
 """Shares of the depth below the observed side at which blobs are tried."""
 
 
@@ -34,33 +34,48 @@ def law(h, amplitude, clip) -> Law:
     return Law({NAME: {**stress, **courses.of(h).numbers}}, placed(h, NAME))
 
 
-def _block(look: Look, where: Where, tried: Sequence[Course], kinds: Sequence[str]) -> Block:
+def _states(look: Look, where: Where) -> np.ndarray:
+    """What one pascal of each component does at the tangent's states [m/Pa], (6, S, K, 3)."""
     share = where.weight(look.rest)[None]
+    return np.stack([at_states(look, gradients(look) @ tensor(*axis), share)[0] for axis in np.eye(6)])
 
-    def columns() -> np.ndarray:
-        units = [tensor(*axis) for axis in np.eye(6)]
-        states = [at_states(look, gradients(look) @ unit, share)[0] for unit in units]
-        bases = courses.bases(look.clip)
-        return np.stack([look.base.tangent.over_time(s, course) for s in states for course in bases])
 
+def _coarse(look: Look, where: Where) -> Block:
+    near, bases = look.base.tangent, courses.bases(look.clip)
+    columns = np.stack([near.over_time(states, course) for states in _states(look, where) for course in bases])
     found = [
-        Hypothesis(NAME, mix, 0, where.place, c.onset, c.end, {**c.about, "kind": kind}, where.scope)
-        for kind in kinds
-        for c, mix in courses.spread(tried, look.clip, KINDS[kind])
+        _hypothesis(mix, where, course, kind)
+        for kind, parts in KINDS.items()
+        for course, mix in courses.spread(courses.tried(look.clip), look.clip, parts)
     ]
-    return Block(look.once("residual stress", where, columns), found)
+    return Block(columns, found)
+
+
+def _exact(look: Look, tried: Sequence[tuple[Where, Course]], kind: str) -> Block:
+    near, parts, columns, found = look.base.tangent, KINDS[kind].T, [], []
+    eye = np.eye(len(parts) * len(tried))
+    for where, course in tried:
+        states = look.once("residual stress", where, lambda w=where: _states(look, w))
+        shape, first = courses.exactly(course, look.clip), len(columns)
+        columns += [near.over_time(np.tensordot(part, states, 1), shape) for part in parts]
+        found.append(_hypothesis(eye[:, first : len(columns)], where, course, kind))
+    return Block(np.stack(columns), found)
+
+
+def _hypothesis(mix: np.ndarray, where: Where, course: Course, kind: str) -> Hypothesis:
+    return Hypothesis(NAME, mix, 0, where.place, course.onset, course.end, {**course.about, "kind": kind}, where.scope)
 
 
 def tried(look: Look) -> Parts:
-    for where in (EVERYWHERE, *layers(look), *blobs(look, DEPTHS)):
-        yield f"stresses, {where.scope}", lambda w=where: iter([_block(look, w, courses.tried(look.clip), [*KINDS])])
+    for n, where in enumerate((EVERYWHERE, *layers(look), *blobs(look, DEPTHS))):
+        yield f"stresses, {where.scope} {n}", lambda w=where: iter([_coarse(look, w)])
 
 
 def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:
-    kinds, course = [h.about["kind"]], courses.of(h)
-    yield _block(look, here(h), list(courses.near(course, step)), kinds)
-    for where in around(look, h, step):
-        yield _block(look, where, [course], kinds)
+    kind, course = h.about["kind"], courses.of(h)
+    yield _exact(look, [(here(h), other) for other in courses.near(course, step)], kind)
+    if h.place is not None:
+        yield _exact(look, [(where, course) for where in around(look, h, step)], kind)
 
 
 CANDIDATE = Candidate(
