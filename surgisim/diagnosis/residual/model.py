@@ -69,11 +69,14 @@ def numbers(found: Joint) -> int:
 
 def _told(case: Case, r: Refit) -> dict[str, Any]:
     h = r.finding.hypothesis
+    every = described(h, r.amplitude, r.finding.spread, case.clip, case.base, r.draws)
+    # What its form leaves out (an end that never comes, a period of what is not periodic) is only in physics.json.
+    free = {name: entry for name, entry in every.items() if entry["low"] < entry["high"]}
     return {
         "term": r.term,
         "place": place_of(h),
         "scope": h.scope,
         "time": time_of(h),
-        "parameters": described(h, r.amplitude, r.finding.spread, case.clip, case.base, r.draws),
+        "parameters": free,
         "size": {"value": float(1e3 * r.finding.size), "unit": "mm"},
     }
