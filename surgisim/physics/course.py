@@ -2,7 +2,7 @@
 
     c(t) = w(t) - w(0),   w(t) = S((t - onset - rise / 2) / rise) S((end - t) / EDGE) exp(-<t - onset> / fade) r(t)
     r(t) = 1 + rhythm (sin(2 pi t / period + phase) - 1)
-    S(x) = (1 + tanh(STEEP x)) / 2,   <x> = max(x, 0)
+    S(x) = (1 + tanh(STEEP x)) / 2,   <x> = x^2 / (x + EDGE) for x > 0, else 0
 
 It comes within `rise` [s] of its onset and stays, unless it fades or ends; with rhythm 1 it is periodic. What is there
 in the first frame already is in equilibrium there, hence - w(0).
@@ -16,7 +16,7 @@ import warp as wp
 from surgisim.physics.catalogue import Param
 
 EDGE = 0.05
-"""How fast it ends [s]."""
+"""How fast it ends, and how gradually it begins to fade [s]."""
 STEEP = 3.75
 """With it S is as steep in the middle as the smoothest polynomial of degree five that rises within one [1]."""
 NEVER = 59.0
@@ -41,7 +41,8 @@ def _whole(theta: Any, first: int, t: Any):
     onset, rise = theta[first], theta[first + 1]
     risen = half * (one + wp.tanh(steep * (t - onset - half * rise) / rise))
     left = half * (one + wp.tanh(steep * (theta[first + 2] - t) / theta.dtype(EDGE)))
-    fades = wp.exp(-wp.max(t - onset, theta.dtype(0.0)) / theta[first + 3])
+    since = wp.max(t - onset, theta.dtype(0.0))
+    fades = wp.exp(-since * since / (since + theta.dtype(EDGE)) / theta[first + 3])
     turn = theta.dtype(2.0) * theta.dtype(wp.pi) * t / theta[first + 5] + theta[first + 6]
     return risen * left * fades * (one + theta[first + 4] * (wp.sin(turn) - one))
 
@@ -61,5 +62,6 @@ def at(t, onset, rise, end, fade, rhythm, period, phase):
 def _whole_at(t, onset, rise, end, fade, rhythm, period, phase):
     risen = 0.5 * (1 + np.tanh(STEEP * (t - onset - 0.5 * rise) / rise))
     left = 0.5 * (1 + np.tanh(STEEP * (end - t) / EDGE))
-    fades = np.exp(-np.maximum(t - onset, 0.0) / fade)
+    since = np.maximum(t - onset, 0.0)
+    fades = np.exp(-(since**2) / (since + EDGE) / fade)
     return risen * left * fades * (1 + rhythm * (np.sin(2 * np.pi * t / period + phase) - 1))

@@ -40,7 +40,7 @@ def quiet(*_):
 def added(case, block) -> np.ndarray:
     """A whitened residual of nothing with a block's first hypothesis in it, as large as can be seen."""
     field = np.tensordot(block.hypotheses[0].mix[:, 0], block.columns, (0, 0))
-    size = 2e-4 / np.sqrt((field**2).sum(-1).mean())
+    size = 4e-4 / np.sqrt((field**2).sum(-1).mean())
     return case.nulls[:, 0] + case.whiten(size * field)
 
 
