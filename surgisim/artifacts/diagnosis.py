@@ -48,5 +48,11 @@ class Diagnosis(JsonArtifact):
     untold: list[str] = field(default_factory=list)
     """Parameters that this recording does not tell: at a bound of what was tried, or hardly surer than beforehand."""
 
+    residual: dict[str, Any] = field(default_factory=dict)
+    """Where nothing is named, what was modelled without a name: laws (each as an effect), character
+    (artifacts/character.py), numbers (how many), log_evidence, fit and held_out (as above, before and after), helps
+    (whether the frames held out come nearer; only then physics.json has it) and words. Empty where that was not tried.
+    """
+
     def __post_init__(self) -> None:
         check(self.verdict in VERDICTS, f"Diagnosis: verdict '{self.verdict}' is none of {VERDICTS}.")

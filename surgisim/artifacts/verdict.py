@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from surgisim.artifacts.character import Character
 from surgisim.artifacts.goodness import Goodness, Nuisance, goodness, nuisances, untold
 from surgisim.problem import Problem
 
@@ -72,6 +73,23 @@ class Marker:
 
 
 @dataclass(frozen=True)
+class Residual:
+    """A law without a name, where a verdict is that no law explains what is there."""
+
+    laws: tuple[Effect, ...]
+    """Its parts, their probability 1; none where none pays for its numbers."""
+    character: dict[str, Any]
+    """Fields of artifacts/character.py's Character; empty without laws."""
+    held_out: dict[str, float]
+    """noise_floor, before, after, flexible [mm], as far as known."""
+    helps: bool
+    """Whether the frames held out come nearer, so that physics.json has it."""
+    numbers: int
+    """How many were free."""
+    words: str
+
+
+@dataclass(frozen=True)
 class Verdict:
     recording: str
     verdict: str
@@ -95,6 +113,8 @@ class Verdict:
     """Parameters that the recording does not tell."""
     evidence: float | None = None
     """Log evidence of the best law over nothing [1]."""
+    residual: Residual | None = None
+    """What was modelled without a name; None where nothing was."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -132,6 +152,7 @@ def read_verdict(path: Path) -> Verdict:
         goodness(body, str(path)),
         untold(body),
         _evidence(body.get("global_test")),
+        _residual(body.get("residual"), f"{path}: residual"),
     )
 
 
@@ -164,6 +185,19 @@ def _effect(raw: Any, where: str) -> Effect:
         others,
         str(raw.get("separating_experiment") or ""),
     )
+
+
+def _residual(raw: Any, where: str) -> Residual | None:
+    if not raw:
+        return None
+    laws = tuple(
+        _effect({**law, "probability": 1.0}, f"{where}, law {i}") for i, law in enumerate(raw.get("laws") or ())
+    )
+    character = raw.get("character") or {}
+    if laws and set(character) != set(Character.__dataclass_fields__):
+        raise Problem(f"{where}: its character has {sorted(character)}, but other fields are wanted. Diagnose anew.")
+    errors = _errors(raw.get("held_out"), f"{where}: held_out")
+    return Residual(laws, character, errors, bool(raw.get("helps")), int(raw.get("numbers") or 0), str(raw["words"]))
 
 
 def _markers(raw: Any, effects: tuple[Effect, ...], path: Path) -> tuple[Marker, ...]:

@@ -34,6 +34,8 @@ class Diagnosing(Settings):
     viscous that steps are short, fewer laws are fitted that way, or none [1]."""
     second: bool = True
     """Whether a second effect is looked for [1]."""
+    residual: bool = True
+    """Whether what no law explains is modelled without a name; no verdict depends on it [1]."""
     noise: Literal["correlated", "independent"] = "correlated"
     """How tracking errors are taken to be related [-]."""
     offsets: bool = True

@@ -12,18 +12,18 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, evidence, judgement, nuisance, verdict
 from surgisim.diagnosis.base import HELD, Base
 from surgisim.diagnosis.base_fit import fit_base, settled
-from surgisim.diagnosis.candidates import Parts, blocks, costly, finer
+from surgisim.diagnosis.candidates import Parts, costly
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.context import Case, nulls, workers
-from surgisim.diagnosis.evidence import Finding, Score, Scores, by_law, highest, judge
+from surgisim.diagnosis.evidence import Finding, Scores, by_law
 from surgisim.diagnosis.joint import Joint, fit_jointly, needed
 from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
-from surgisim.diagnosis.locate import worst
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import metric
 from surgisim.diagnosis.noise import Whitener, by_frame, estimate, whitener
 from surgisim.diagnosis.nuisance import Group
 from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
+from surgisim.diagnosis.search import search, sharpened, threshold
 from surgisim.estimation.trial import at_once
 from surgisim.mpm.simulator import Breakdown
 from surgisim.problem import Problem
@@ -261,26 +261,6 @@ def whitened(whiten: Whitener, groups: list[Group], until: int) -> np.ndarray:
     return np.concatenate(parts, 1) if parts else np.zeros((3 * whiten.mask.size, 0), np.float32)
 
 
-def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts | None = None) -> list[Finding]:
-    """Every hypothesis of `parts` (or of all that is cheap) against a whitened residual."""
-    residuals = case.space.cleared(np.concatenate([z[:, None].astype(np.float32), nulls], 1))
-    only = worst(case.clip, case.base.simulated, case.noise) if case.settings.cause == "symptom" else None
-    parts, found, source = list(parts or blocks(case.clip, case.base, case.memo, only)), [], 0
-    for n, (name, make) in enumerate(parts):
-        progress(n / len(parts), f"trying {name} ({n + 1} of {len(parts)})")
-        for block in make():
-            found += judge(block, case.whiten, case.space, residuals, source, case.clip.seen[:, : case.clip.until])
-            source += 1
-    return found
-
-
-def threshold(laws: Scores, settings: Diagnosing) -> float:
-    """log evidence of the fitted frames that the best law must exceed to be run."""
-    if not settings.calibrated:
-        return 0.0
-    return max(calibration.TRIED, float(np.quantile(highest(laws), 0.95)))
-
-
 def from_rest(case: Case, best: Refit, z: np.ndarray) -> bool:
     """Whether paths of grips count from where tissue was at rest: whether the best law fits clearly better that way."""
     law, until = law_of(best.finding.hypothesis, best.amplitude, case.clip), case.clip.until
@@ -295,17 +275,6 @@ def from_rest(case: Case, best: Refit, z: np.ndarray) -> bool:
     except IMPOSSIBLE:
         return False
     return found - rest > calibration.THRESHOLD
-
-
-def sharpened(case: Case, law: Score, z: np.ndarray, start: Finding | None = None) -> tuple[Finding, float]:
-    """A law's best finding, or the best near `start`, on two finer lattices, and the law's evidence there."""
-    best = start or law.best
-    residual, seen = case.space.cleared(z[:, None]), case.clip.seen[:, : case.clip.until]
-    for step in (1.0, 0.5):
-        for block in finer(case.clip, case.base, best.hypothesis, step):
-            found = judge(block, case.whiten, case.space, residual, -1, seen)
-            best = max([best, *(f for f in found if f.hypothesis.term == best.hypothesis.term)], key=lambda f: f.gain)
-    return best, law.evidence + 0.5 * (best.gain - law.best.gain)
 
 
 def explained_by(case: Case, refits: list[Refit], progress: Progress) -> tuple[list, Joint]:

@@ -51,40 +51,50 @@ def beside(h: Hypothesis, amplitude: np.ndarray, stiffer: float) -> tuple[Hypoth
     return (h, amplitude) if same is None else same(h, amplitude, stiffer)
 
 
-def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = None) -> np.ndarray:
-    """Displacement of the points with the law [m], (K, frames, 3), by the engine. Raises what is IMPOSSIBLE.
+def run_with(clip: Clip, base: Base, law: Law, frames: int) -> tuple[Prepared, Run]:
+    """The body under base and law, as the engine runs it. Raises what is IMPOSSIBLE.
 
     base: its x may be followed by moments of release, (3 + R,).
     """
-    frames, clip = frames or clip.frames, clip.opens(base.x[3:])
+    clip = clip.opens(base.x[3:])
     values = {**values_on(clip, base.x), **law.values}
     motion = clip.motion if law.motion is None else law.motion
+    prepared = clip.prepared(tuple(values), motion=motion)
+    theta = prepared.theta(values, law.places)
+
+    def at(safety: float) -> Run:
+        per_frame = steps(clip, prepared, theta, safety)
+        drive = prepared.drive(
+            motion,
+            values,
+            fps=clip.fps,
+            per_frame=per_frame,
+            frames=clip.frames,
+            places=law.places,
+            late=clip.opening,
+        )
+        if clip.shifted:
+            return follow(prepared.simulator, theta, drive, last=frames - 1)
+        return prepared.simulator.run(theta, drive, last=frames - 1)
+
+    return prepared, boldly(at)
+
+
+def respond(clip: Clip, base: Base, law: Law, memo: Memo, frames: int | None = None) -> np.ndarray:
+    """Displacement of the points with the law [m], (K, frames, 3), by the engine. Raises what is IMPOSSIBLE.
+
+    base: as for `run_with`.
+    """
+    frames, opened = frames or clip.frames, clip.opens(base.x[3:])
+    values = {**values_on(opened, base.x), **law.values}
 
     def make() -> dict[str, np.ndarray]:
-        prepared = clip.prepared(tuple(values), motion=motion)
-        theta = prepared.theta(values, law.places)
-
-        def at(safety: float) -> Run:
-            per_frame = steps(clip, prepared, theta, safety)
-            drive = prepared.drive(
-                motion,
-                values,
-                fps=clip.fps,
-                per_frame=per_frame,
-                frames=clip.frames,
-                places=law.places,
-                late=clip.opening,
-            )
-            if clip.shifted:
-                return follow(prepared.simulator, theta, drive, last=frames - 1)
-            return prepared.simulator.run(theta, drive, last=frames - 1)
-
-        run = boldly(at)
+        prepared, run = run_with(clip, base, law, frames)
         return {"seen": carried(prepared.simulator.carry(clip.rest), run).astype(np.float32)}
 
     moved = None if law.motion is None else np.round(law.motion.position, 9).tolist()
     where = {n: [list(p.center), p.extent, p.normal] for n, p in law.places.items()}
-    return memo(["law", values, _plain(where), moved, frames, *clip.kind], make)["seen"].astype(float)
+    return memo(["law", values, _plain(where), moved, frames, *opened.kind], make)["seen"].astype(float)
 
 
 def steps(clip: Clip, prepared: Prepared, theta: np.ndarray, safety: float = SAFETY) -> int:
@@ -138,4 +148,6 @@ def _plain(value):
     return None if value is None else float(value)
 
 
-__all__ = ["IMPOSSIBLE", "Clash", "Law", "beside", "described", "joined", "law_of", "respond", "steps"]
+__all__ = [
+    "IMPOSSIBLE", "Clash", "Law", "beside", "described", "joined", "law_of", "respond", "run_with", "steps",
+]  # fmt: skip

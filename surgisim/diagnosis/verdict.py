@@ -8,7 +8,7 @@ import numpy as np
 from surgisim.artifacts.diagnosis import Diagnosis
 from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.physics import Physics
-from surgisim.diagnosis import calibration, candidates, words
+from surgisim.diagnosis import calibration, words
 from surgisim.diagnosis.clip import PHASES
 from surgisim.diagnosis.context import Case
 from surgisim.diagnosis.errors import as_filmed, errors, residual, rms
@@ -35,6 +35,8 @@ from surgisim.diagnosis.markers import largest, markers
 from surgisim.diagnosis.model import base_numbers, physics
 from surgisim.diagnosis.placebo import placebo
 from surgisim.diagnosis.replay import Replay, replayed
+from surgisim.diagnosis.residual.model import modelled
+from surgisim.diagnosis.said import place_of, time_of
 
 RUNNERS = 4
 """Other laws that an effect lists."""
@@ -84,6 +86,10 @@ def write(
         names = told_apart[0].term, told_apart[1].term
         effects[0]["separating_experiment"] = separating(clip, base, *pair, case.memo, names, rng, case.workers)
     said = _words(case, said_of, refits, laws, z, held_out)
+    unnamed = None
+    if verdict == "unexplained" and said_of.reason != "ungrasped" and case.settings.residual:
+        unnamed = modelled(case, say)
+        said += f" {unnamed.words}"
     above = detectable(case, laws)
     diagnosis = Diagnosis(
         recording=clip.recording.name,
@@ -111,6 +117,7 @@ def write(
             "spacing": {"value": float(1e3 * shown.clip.body.spacing), "unit": "mm"},
             "beside": None if fitted is None or fitted.beside is None else _beside(case, fitted.beside),
         },
+        residual={} if unnamed is None else unnamed.told,
     )
     mismatch = Mismatch(
         points=clip.rest,
@@ -123,6 +130,8 @@ def write(
         cause_time=np.concatenate([when, np.zeros(clip.frames - clip.until)]),
         phase=clip.phases(),
     )
+    if unnamed is not None and unnamed.helps:
+        return diagnosis, physics(replace(case, clip=unnamed.shown.clip), unnamed.refits), mismatch
     return diagnosis, physics(on_shown, said_of.accepted if named else []), mismatch
 
 
@@ -168,19 +177,13 @@ def missing(clip) -> list[str]:
 
 def _effect(case: Case, r, chances, named: set[str]) -> dict:
     h: Hypothesis = r.finding.hypothesis
-    # Of a blob the radius at which it is down to a half; a grip's own radius.
-    reach = 1.0 if candidates.of(h).exact_extent else np.sqrt(2 * np.log(2))
     others = sorted((t for t in chances if t not in named), key=lambda t: -chances[t])
     runners = [{"term": t, "probability": chances[t]} for t in others]
-    local = h.place is not None and h.place.normal is None
-    place: dict | str = "everywhere"
-    if local:
-        place = {"center": [float(c) for c in h.place.center], "extent": float(reach * h.place.extent), "unit": "m"}
     return {
         "term": r.term,
         "probability": chances[r.term],
-        "place": place,
-        "time": {"onset": None if h.onset is None else float(h.onset), "end": None if h.end is None else float(h.end)},
+        "place": place_of(h),
+        "time": time_of(h),
         "parameters": described_of(case, r),
         "runners_up": runners[:RUNNERS],
         "separating_experiment": "",

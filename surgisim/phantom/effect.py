@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from surgisim.artifacts.character import Truly
 from surgisim.phantom import effects
 from surgisim.phantom.model import Model
 from surgisim.phantom.scene import Scene
@@ -71,6 +72,8 @@ class Effect:
     """The parameter at the hidden magnitude, in `unit`."""
     outside: bool = False
     """Not in the catalogue of what a diagnosis may name."""
+    character: Truly | None = None
+    """Of what is outside: how a law without a name is rightly said to behave."""
     faint: bool = False
     """Cannot be seen at a magnitude that tissue has; not drawn unless asked for."""
 

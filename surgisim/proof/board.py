@@ -101,6 +101,8 @@ def figures(cases: list[Case]) -> dict[str, Any]:
     # Where the effect is not in the held-out frames (a push that is over), nobody can cut anything there.
     shown = [c["held_out"] for c in cases if c["held_out"] and c["held_out"]["shows"] and c["kind"] in ("one", "two")]
     rows = [row for c in cases for row in c["parameters"]]
+    # Scores that were made before laws without a name were have none.
+    unnamed = [c["unnamed"] for c in cases if c.get("unnamed")]
     return {
         "count": len(cases),
         "top1": share(c["top1"] for c in single).told(),
@@ -123,6 +125,11 @@ def figures(cases: list[Case]) -> dict[str, Any]:
         "cut": median(h["share"] for h in shown),
         "cut_effect": median(h["share_effect"] for h in shown),
         "placebo_better": share(h["placebo_better"] for h in errors).told(),
+        "unnamed_modelled": share(u["modelled"] for u in unnamed).told(),
+        "unnamed_cut": median(u["share"] for u in unnamed if u["share"] is not None),
+        "unnamed_rises": share(u["rises"] for u in unnamed).told(),
+        "unnamed_character": share(u["character"] for u in unnamed).told(),
+        "unnamed_answers": share(right for u in unnamed for right in u["asked"].values()).told(),
     }
 
 

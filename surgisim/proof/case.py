@@ -4,14 +4,18 @@ from typing import Any
 
 import numpy as np
 
+from surgisim.artifacts.character import Truly
 from surgisim.artifacts.mismatch import Mismatch
 from surgisim.artifacts.verdict import Effect, Verdict
+from surgisim.phantom.effect import catalogue
+from surgisim.phantom.families.hidden import KINDS
 from surgisim.problem import Problem
 from surgisim.proof.held_out import held_out
 from surgisim.proof.naming import common, naming
 from surgisim.proof.numbers import parameters
 from surgisim.proof.places import onset, place
 from surgisim.proof.truth import Truth
+from surgisim.proof.unnamed import unnamed
 from surgisim.recordings.recording import Recording
 
 FORMAT = "surgisim-score/1"
@@ -30,6 +34,7 @@ def score(
             f"the truth is of {told['recording']}, the recording is {recording.name} and the diagnosis is of "
             f"{verdict.recording}. Score files of one case."
         )
+    errors = held_out(truth, recording, verdict, mismatch)
     return {
         "format": FORMAT,
         "recording": recording.name,
@@ -49,12 +54,21 @@ def score(
         "places": [p for e, named in _pairs(truth, verdict) if (p := place(e, named, cell))],
         "onsets": [o for e, named in _pairs(truth, verdict) if (o := onset(e, named, recording.fps))],
         "parameters": [row for e, named in _pairs(truth, verdict) for row in parameters(e, named, told["base"])],
-        "held_out": held_out(truth, recording, verdict, mismatch),
         "evidence": verdict.evidence,
+        "held_out": errors,
+        "unnamed": unnamed(told["kind"], _character(told), verdict, errors),
         "detectable_above": verdict.detectable_above,
         "missing_phases": list(verdict.missing_phases),
         "words": verdict.words,
     }
+
+
+def _character(told: dict[str, Any]) -> Truly | None:
+    """How what is concealed behaves; None of what has a name."""
+    if told["kind"] != "outside":
+        return None
+    name, blocks = told["effects"][0]["term"], "family" not in told
+    return catalogue()[name].character if blocks else KINDS[name].character
 
 
 def phases(recording: Recording) -> list[str]:

@@ -12,6 +12,7 @@ import pytest
 from browser import Browser, installed
 from proof import made_up
 from proof.made_up import diagnosis, named
+from proof.test_unnamed import residual
 
 from surgisim.artifacts.verdict import Effect
 from surgisim.physics.catalogue import catalogue
@@ -122,6 +123,17 @@ def test_pictures_have_the_axes_of_the_recording_and_mirror_nothing(tmp_path, up
         assert (np.cross(view.right, view.down) == along).all()
     assert looks["side"].view.down @ up < -0.8
     assert looks["oblique"].axes is None
+
+
+def test_a_law_without_a_name_is_shown_with_its_character_and_whether_it_predicts(tmp_path):
+    for helps, words in (
+        (True, "This law and its numbers stand in physics.json"),
+        (False, "It is not in physics.json."),
+    ):
+        told = diagnosis(verdict="unexplained", residual=residual(helps=helps))
+        text = shown(tmp_path / str(helps), told).decode()
+        for each in (words, "Without a name", "It grows.", "also at rest", "in one place", "S = T w(X) c(t)", "0.750"):
+            assert each in text, each
 
 
 def test_how_well_it_fits_is_shown_where_it_is_told(tmp_path):

@@ -11,7 +11,7 @@ tangent's states.
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from functools import cache
 
 import numpy as np
@@ -23,6 +23,7 @@ from surgisim.diagnosis.form import Block
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.look import Look
 from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.residual import forms
 
 
 @cache
@@ -33,8 +34,8 @@ def catalogue() -> dict[str, Candidate]:
 
 
 def of(h: Hypothesis) -> Candidate:
-    """The law that a hypothesis is about."""
-    return catalogue()[h.term]
+    """The law that a hypothesis is about, which may be one without a name."""
+    return catalogue().get(h.term) or forms.catalogue()[h.term]
 
 
 def blocks(clip: Clip, base: Base, memo: Memo, only: np.ndarray | None = None) -> Parts:
@@ -49,6 +50,11 @@ def blocks(clip: Clip, base: Base, memo: Memo, only: np.ndarray | None = None) -
 def of_law(term: str, clip: Clip, base: Base, memo: Memo) -> Parts:
     """All that is tried of one law and is cheap."""
     return _parts(Look(clip, base, memo), [catalogue()[term].tried])
+
+
+def without_a_name(look: Look, left_out: Collection[str] = ()) -> Parts:
+    """All that is tried of the forms of a residual law, but for those left out."""
+    return _parts(look, [c.tried for name, c in forms.catalogue().items() if name not in left_out])
 
 
 def costly(clip: Clip, base: Base, memo: Memo, workers: int) -> Parts:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from surgisim.artifacts.character import Truly
 from surgisim.phantom.effect import Effect, Hidden
 from surgisim.phantom.forces import FAST
 from surgisim.phantom.strains import Patch, cofactor, gradient, scatter
@@ -51,4 +52,8 @@ def apply(model, hidden):
     return model.with_force(Sponge(patch, bulk, hidden.number("tau"), np.zeros(len(patch.cells))))
 
 
-EFFECT = Effect(draw=draw, apply=apply, parameter="fading", unit="1", start=0.6, most=0.97, outside=True)
+# Only what is loaded drains; then resistance fades, and work is lost on the way.
+CHARACTER = Truly(at_rest=(False,), change=("fades",), energy=("takes",), local=(False,))
+EFFECT = Effect(
+    draw=draw, apply=apply, parameter="fading", unit="1", start=0.6, most=0.97, outside=True, character=CHARACTER
+)

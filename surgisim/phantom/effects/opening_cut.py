@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from surgisim.artifacts.character import Truly
 from surgisim.phantom.effect import Effect, Hidden, near_grip
 from surgisim.phantom.model import in_lanes
 from surgisim.phantom.timeline import ease
@@ -73,4 +74,16 @@ def apply(model, hidden):
     return replace(model, parts=replace(parts, mu=now[0], lam=now[1])).with_force(law)
 
 
-EFFECT = Effect(draw=draw, apply=apply, parameter="length", unit="m", start=0.8, most=2.0, value=length, outside=True)
+# It opens within a moment and stays open; what was stored in the cut is lost. Where nothing pulls nothing shows.
+CHARACTER = Truly(at_rest=(False,), change=("holds",), energy=("takes",), local=(True,))
+EFFECT = Effect(
+    draw=draw,
+    apply=apply,
+    parameter="length",
+    unit="m",
+    start=0.8,
+    most=2.0,
+    value=length,
+    outside=True,
+    character=CHARACTER,
+)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surgisim.artifacts.character import Truly
 from surgisim.phantom.effect import Effect, Hidden, in_phase, near_grip
 from surgisim.phantom.loads import window
 
@@ -65,4 +66,9 @@ def apply(model, hidden):
     return model.with_force(Jaws(nodes, stiffness, points[nodes], pull, hidden))
 
 
-EFFECT = Effect(draw=draw, apply=apply, parameter="displacement", unit="m", start=3e-3, most=9e-3, outside=True)
+# It lets go again before the fitted frames end, maybe before the recorded grip does. Which of the two pulls the other
+# along is a matter of when they move, so that the sign of its work is not asked for.
+CHARACTER = Truly(at_rest=(True, None), change=("fades",), local=(True,))
+EFFECT = Effect(
+    draw=draw, apply=apply, parameter="displacement", unit="m", start=3e-3, most=9e-3, outside=True, character=CHARACTER
+)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from surgisim.artifacts.character import Truly
 from surgisim.phantom.effect import Effect, Hidden
 from surgisim.phantom.forces import FAST
 from surgisim.phantom.strains import Patch, cofactor, gradient, scatter, square
@@ -50,4 +51,8 @@ def apply(model, hidden):
     return model.with_force(Softer(model.patch(), modulus, hidden.number("width")))
 
 
-EFFECT = Effect(draw=draw, apply=apply, parameter="most", unit="1", start=0.6, most=0.95, outside=True)
+# It conserves energy: what a load stores less than before, a release gives back less.
+CHARACTER = Truly(at_rest=(False,), change=("holds",), energy=("neither",), local=(False,))
+EFFECT = Effect(
+    draw=draw, apply=apply, parameter="most", unit="1", start=0.6, most=0.95, outside=True, character=CHARACTER
+)

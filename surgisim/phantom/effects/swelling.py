@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from surgisim.artifacts.character import Truly
 from surgisim.phantom.effect import Effect, Hidden, in_phase, near_grip
 from surgisim.phantom.forces import FAST
 from surgisim.phantom.strains import Patch, cofactor, gradient, scatter
@@ -56,4 +57,8 @@ def apply(model, hidden):
     return model.with_force(Growth(share, pressure, hidden.onset, hidden.number("rise")))
 
 
-EFFECT = Effect(draw=draw, apply=apply, parameter="strain", unit="1", start=0.05, most=0.3, outside=True)
+# It grows for a second or two, whatever loads the tissue, pushes the tissue apart, and stays.
+CHARACTER = Truly(at_rest=(True,), change=("grows",), energy=("gives",), local=(True,))
+EFFECT = Effect(
+    draw=draw, apply=apply, parameter="strain", unit="1", start=0.05, most=0.3, outside=True, character=CHARACTER
+)

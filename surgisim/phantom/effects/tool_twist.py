@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from surgisim.artifacts.character import Truly
 from surgisim.phantom.effect import Effect, Hidden, in_phase
 from surgisim.phantom.timeline import ease
 
@@ -44,4 +45,8 @@ def apply(model, hidden):
     return replace(model, grasp=(turning, *model.grasp[1:]))
 
 
-EFFECT = Effect(draw=draw, apply=apply, parameter="angle", unit="rad", start=0.8, most=1.6, outside=True)
+# It turns the tissue as long as the grip holds, and is over with it.
+CHARACTER = Truly(at_rest=(False, None), change=("fades", "grows"), energy=("gives",), local=(True,))
+EFFECT = Effect(
+    draw=draw, apply=apply, parameter="angle", unit="rad", start=0.8, most=1.6, outside=True, character=CHARACTER
+)

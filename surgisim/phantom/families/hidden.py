@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from surgisim.artifacts.character import Truly
 from surgisim.phantom.families.world import World
 
 
@@ -52,8 +53,8 @@ class Kind:
     """The parameter at the hidden magnitude."""
     outside: bool = False
     """Not in the catalogue of what a diagnosis may name."""
-    character: tuple[str, ...] = ()
-    """How it shows, for one that has no name: words of `proof.character`."""
+    character: Truly | None = None
+    """How it behaves, of what has no name."""
 
 
 def everywhere(world, rng, name):
@@ -191,15 +192,16 @@ KINDS: dict[str, Kind] = {
     "sliding_base": Kind(draw=everywhere, start=2.0, most=60.0, parameter="inverse_traction"),
     "swelling": Kind(
         draw=_swelling, start=0.1, most=0.6, parameter="growth", outside=True,
-        character=("at rest", "holds", "gives", "local"),
+        character=Truly(at_rest=(True,), change=("grows",), energy=("gives",), local=(True,)),
     ),
     "second_grip": Kind(
         draw=_second, start=1.0, most=6.0, parameter="way", outside=True,
-        character=("at rest", "grows", "gives", "local"),
+        character=Truly(at_rest=(True,), change=("grows",), energy=("gives",), local=(True,)),
     ),
     "softening": Kind(
         draw=_softening, start=0.2, most=0.7, parameter="lost", outside=True,
-        character=("under load", "holds", "takes", "everywhere"),
+        # What a softer tissue stores less it loses where it is held: whose work that is is not asked.
+        character=Truly(at_rest=(False,), local=(False,)),
     ),
 }  # fmt: skip
 
@@ -219,7 +221,6 @@ def described(world: World, hidden: Hidden, own: bool) -> dict:
         "time": {"onset": hidden.onset, "end": hidden.end},
         "parameters": numbers,
         "magnitude": hidden.magnitude,
-        "character": list(kind.character),
     }
 
 

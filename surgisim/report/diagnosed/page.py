@@ -2,6 +2,7 @@
 
 from surgisim.report.diagnosed import goodness, places, times
 from surgisim.report.diagnosed.case import Diagnosed
+from surgisim.report.diagnosed.character import character
 from surgisim.report.diagnosed.laws import law
 from surgisim.report.digits import shown
 from surgisim.report.headline import Card
@@ -35,9 +36,18 @@ def page(case: Diagnosed, made: Made | None = None, *, progress=lambda *_: None)
     }
     content = {"case": case, "pictures": pictures, "cards": cards(case), "badge": BADGE[case.verdict.verdict]}
     content |= {"laws": [law(e, str(n)) for n, e in enumerate(case.verdict.effects, 1)], "title": title(case)}
+    content |= without_a_name(case)
     text = template("diagnosis.html.j2").render(**content, made=made, shown=shown)
     progress(3, 3, "written")
     return text.encode()
+
+
+def without_a_name(case: Diagnosed) -> dict[str, list]:
+    """Laws without a name, and their character as rows of a table."""
+    found = case.verdict.residual
+    if found is None or not found.laws:
+        return {"unnamed": [], "character": []}
+    return {"unnamed": [law(e) for e in found.laws], "character": character(found.character)}
 
 
 def title(case: Diagnosed) -> str:
