@@ -135,6 +135,9 @@ def diagnose(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="A key of config.yaml's section 'diagnosis'; repeatable."),
     ] = None,
+    base: Annotated[
+        Path | None, typer.Option(help="The physics.json in which another recording told of this body's base.")
+    ] = None,
     debug: Debug = False,
 ) -> None:
     """Say what physics a recording's simulation lacks, and how surely; a second start goes on where one stopped."""
@@ -145,7 +148,7 @@ def diagnose(
     from surgisim.report.diagnosed.page import page
 
     with plain_errors(debug):
-        typer.echo(carry_out(recording, out, of_diagnosis(tuple(config or ()), tuple(set_ or ()))))
+        typer.echo(carry_out(recording, out, of_diagnosis(tuple(config or ()), tuple(set_ or ())), base))
         files = (out / name for name in ("diagnosis.json", "mismatch.npz", "physics.json"))
         case = read(recording, *files)
         save_bytes({out / "diagnosis.html": page(case, case.made(), progress=Progress("page"))})

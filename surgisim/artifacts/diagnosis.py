@@ -48,5 +48,10 @@ class Diagnosis(JsonArtifact):
     untold: list[str] = field(default_factory=list)
     """Parameters that this recording does not tell: at a bound of what was tried, or hardly surer than beforehand."""
 
+    as_given: list[str] = field(default_factory=list)
+    """Parameters of which something was known of this body beforehand, and which the recording makes hardly surer."""
+    elsewhere: dict[str, Any] = field(default_factory=dict)
+    """The base that another recording told: file, numbers (low, high, unit by name), passed_over laws; {} if none."""
+
     def __post_init__(self) -> None:
         check(self.verdict in VERDICTS, f"Diagnosis: verdict '{self.verdict}' is none of {VERDICTS}.")

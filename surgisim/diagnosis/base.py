@@ -11,7 +11,7 @@ import numpy as np
 from surgisim.diagnosis import calibration
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
-from surgisim.diagnosis.prior import SPREAD, START, Prior
+from surgisim.diagnosis.prior import SPREAD, START, USUAL, Prior
 from surgisim.diagnosis.tangent import Tangent
 from surgisim.mpm.closing import follow
 from surgisim.mpm.grip import Drive
@@ -87,6 +87,8 @@ class Base:
     known: Known
     bound: tuple[str, ...] = ()
     """Numbers that came to the end of what is tried."""
+    prior: Prior = USUAL
+    """What was known of its numbers beforehand."""
 
     @property
     def spread(self) -> np.ndarray:
@@ -98,6 +100,11 @@ class Base:
         """Names of numbers that the recording does not tell: at an end of what is tried, or hardly surer."""
         vague = self.spread > TOLD * SPREAD
         return tuple(name for name, v in zip(NAMES, vague, strict=True) if v or name in self.bound)
+
+    @property
+    def as_given(self) -> tuple[str, ...]:
+        """Names of numbers that the recording makes hardly surer than they were known beforehand."""
+        return tuple(name for name, v in zip(NAMES, self.spread > TOLD * self.prior.spread, strict=True) if v)
 
 
 def values_of(x: np.ndarray) -> Values:

@@ -185,7 +185,8 @@ def fit_base(
     units = slopes[:3] * clip.prior.spread[:, None, None, None]
     clip = ran.clip.less(None if ran.finer is laid else ran.error)
     bound = at_bound(ran.x, clip)
-    return clip, Base(ran.x, laid.bodies[0], ran.drive, ran.run, ran.simulated, near, units, known, bound), ran.finer
+    base = Base(ran.x, laid.bodies[0], ran.drive, ran.run, ran.simulated, near, units, known, bound, clip.prior)
+    return clip, base, ran.finer
 
 
 def _all_over(

@@ -51,7 +51,8 @@ class Recording:
     astray: float = 0.0
     """Of how far a point has gone, how far its track is off [1]."""
     expected: dict[str, tuple[float, float]] = field(default_factory=dict)
-    """90 % intervals of what is known beforehand of the base's "E" [Pa] and "eta / E" [s], by their names."""
+    """90 % intervals of what is known beforehand of the base's "E" [Pa], "eta / E" [s], and of "nu" where another
+    recording's base told it, by their names."""
     split: dict[str, tuple[int, int]] | None = None
     """Frames `fit` and `held_out`, first and one past the last."""
     torn: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
