@@ -5,6 +5,7 @@ Its numbers x are log E, nu and log eta / E, and may be followed by the moments 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.problem import Problem
+
+if TYPE_CHECKING:
+    from surgisim.diagnosis.pulls import Pulls
 
 TERMS = ("neo_hookean_ciarlet", "newtonian")
 LOW, HIGH = np.array([np.log(2e2), 0.30, np.log(5e-5)]), np.array([np.log(1e6), 0.49, np.log(5e-2)])
@@ -89,6 +93,8 @@ class Base:
     """Numbers that came to the end of what is tried."""
     prior: Prior = USUAL
     """What was known of its numbers beforehand."""
+    pulls: "Pulls | None" = None
+    """Forces, where any were measured."""
 
     @property
     def spread(self) -> np.ndarray:

@@ -19,6 +19,7 @@ from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric
 from surgisim.diagnosis.noise import Whitener
 from surgisim.diagnosis.prior import USUAL
+from surgisim.diagnosis.pulls import Pulls
 from surgisim.estimation.trial import at_once
 from surgisim.mpm.setup import Prepared
 from surgisim.mpm.simulator import Breakdown, Run
@@ -85,6 +86,8 @@ class RingDown:
     simulated: np.ndarray
     """Of the run [m], (K, T_fit, 3)."""
     by_poisson: np.ndarray
+    pulls: Pulls | None = None
+    """Forces near that run, where any were measured."""
 
     @property
     def middle(self) -> np.ndarray:
@@ -128,7 +131,8 @@ class RingDown:
         if left is None:
             return np.inf
         prior = (((y - self.middle) / self.reach) ** 2).sum()
-        return float(self.space.gram(left[:, None], left[:, None])[0, 0] + prior)
+        forces = 0.0 if self.pulls is None else self.pulls.cost(y)
+        return float(self.space.gram(left[:, None], left[:, None])[0, 0] + prior + forces)
 
     def slopes(self, y: np.ndarray) -> np.ndarray:
         """Derivative of the points' displacement by y [m], (3 + R, K, T_fit, 3)."""
@@ -141,9 +145,20 @@ class RingDown:
         stiffer, slower, *later = ((m - middle) / a for m, a in zip(moved, aside, strict=True))
         return np.stack([stiffer, self.by_poisson, slower, *later])
 
-    def normal(self, slopes: np.ndarray) -> np.ndarray:
+    def normal(self, slopes: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Second derivative of half the cost at y by y, (3 + R, 3 + R)."""
         J = self.whiten(slopes).T
-        return self.space.gram(J, J) + np.diag(1 / self.reach**2)
+        normal = self.space.gram(J, J) + np.diag(1 / self.reach**2)
+        if self.pulls is not None:
+            normal[:3, :3] += self.pulls.slopes(y).T @ self.pulls.slopes(y)
+        return normal
+
+    def pull(self, slopes: np.ndarray, at: "Descent") -> np.ndarray:
+        """Less the first derivative of half the cost where a descent is, (3 + R,)."""
+        pull = self.space.gram(self.whiten(slopes).T, at.left[:, None])[:, 0] - (at.y - self.middle) / self.reach**2
+        if self.pulls is not None:
+            pull[:3] += self.pulls.slopes(at.y).T @ self.pulls.left(at.y)
+        return pull
 
     def steady(self) -> np.ndarray:
         """Where the run began, with the nu that pull and hold ask for, which hardly depends on the other numbers."""
@@ -211,8 +226,7 @@ class RingDown:
                 return
             say(f"base: {told(at.y)}")
             slopes = self.slopes(at.y)
-            normal = self.normal(slopes)
-            pull = self.space.gram(self.whiten(slopes).T, at.left[:, None])[:, 0] - (at.y - self.middle) / self.reach**2
+            normal, pull = self.normal(slopes, at.y), self.pull(slopes, at)
             before = at.cost
             if not self._downhill(at, normal, pull):
                 at.done = True
