@@ -18,14 +18,15 @@ from surgisim.stage import Bytes, Source, stage
         "recording": Source("a recording folder"),
         "work": Source("a folder that keeps finished runs, so that a second start goes on", required=False),
         "base": Source("physics.json in which another recording told of this body's base", required=False),
+        "hold_out": Source("a folder of another recording of the body, which is never fitted", required=False),
     },
     writes={"diagnosis": Diagnosis, "physics": Physics, "mismatch": Mismatch, "cloud": Bytes(".ply")},
     settings=Diagnosing,
 )
-def main(recording, work, base, *, settings, progress):
+def main(recording, work, base, hold_out, *, settings, progress):
     from surgisim.diagnosis.files import cloud, diagnosed
 
-    found, physics, mismatch = diagnosed(recording, settings, progress, work, base)
+    found, physics, mismatch = diagnosed([recording], settings, progress, work, base, hold_out)
     return found, physics, mismatch, cloud(mismatch)
 
 

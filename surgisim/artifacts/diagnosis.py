@@ -52,6 +52,8 @@ class Diagnosis(JsonArtifact):
     """Parameters of which something was known of this body beforehand, and which the recording makes hardly surer."""
     forces: dict[str, Any] = field(default_factory=dict)
     """Beside the base: count, largest, simulated_there and rms_left of measured forces, unit; empty if none."""
+    foretold: dict[str, Any] = field(default_factory=dict)
+    """Of another recording that was never fitted: its name, RMS before and after what is named, unit; {} if none."""
     elsewhere: dict[str, Any] = field(default_factory=dict)
     """The base that another recording told: file, numbers (low, high, unit by name), passed_over laws; {} if none."""
 

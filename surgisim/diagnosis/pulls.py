@@ -68,11 +68,16 @@ class Pulls:
         return self.white(np.stack([self.at(y), times * self.by_ratio, times * self.by_lag], 1))
 
     def white(self, over_noise: np.ndarray) -> np.ndarray:
-        """With each anchor's share taken into account, (N, ...): of covariance I + s^2 m m', m what was measured."""
+        """With each anchor's share taken into account, (N, ...): of covariance I + s^2 m m'.
+
+        m: the simulated course, as large as the measured one. That itself would not do: it holds the noise, to which a
+        course without any is never parallel, the less so the larger it is.
+        """
         result = over_noise.astype(float).copy()
         for a in np.unique(self.anchor):
             mine = self.anchor == a
-            way = self.measured[mine]
+            way = self.simulated[mine]
+            way = way * (way @ self.measured[mine]) / max(float(way @ way), 1e-30)
             size = float(way @ way)
             if size > 0:
                 less = (1 - 1 / np.sqrt(1 + SHARE**2 * size)) / size

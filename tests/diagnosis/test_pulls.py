@@ -46,6 +46,10 @@ def test_a_force_that_is_off_as_a_whole_is_off_by_its_share_however_little_its_n
     measured = np.array([1e3, 2e3, -5e2])
     found = pulls((1 + SHARE) * measured, measured)
     assert found.cost(TRUE) == pytest.approx(1.0, rel=1e-3)
+    # Noise across its course draws the modulus nowhere.
+    noise = 10 * np.array([2.0, -1.0, 0.0]) / np.sqrt(5.0)
+    costs = [pulls(measured, measured + noise).cost(TRUE + d * np.eye(3)[0]) for d in (-0.02, 0.0, 0.02)]
+    assert costs[1] < min(costs[::2])
     # Of covariance I + s^2 m m'.
     whole = np.linalg.inv(np.eye(3) + SHARE**2 * np.outer(measured, measured))
     left = np.array([3.0, -2.0, 7.0])
