@@ -20,7 +20,7 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis.base import SAFETY, TERMS
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.memo import NOTHING_KEPT, Memo
-from surgisim.diagnosis.prior import SPREAD, prior_of
+from surgisim.diagnosis.prior import prior_of
 from surgisim.diagnosis.swinging import course as courses
 from surgisim.diagnosis.swinging.course import Course, simulate
 from surgisim.diagnosis.swinging.fit import Body, Tried, fit_base, try_base, try_law, units
@@ -58,7 +58,7 @@ def diagnose_swinging(
     if not first.body.held.any():
         raise Problem(f"recording {first.recording.name}: nothing holds the body. Say in fixed.json what does.")
     prior = prior_of(first.recording)
-    given = prior.middle if first.recording.expected else None
+    given = prior if first.recording.expected else None
     elastic, settles = settings.base == "elastic", all(courses.comes_to_rest(c) for c in clips)
     rough = tuple(courses.fitted(c, _liveliest_period(c)) for c in clips)
     body, held = _held_out(Body(rough, elastic, settles, memo), held_out, settings)
@@ -70,12 +70,11 @@ def diagnose_swinging(
         replace(c, weight=courses.alike(c.clip, told.period)) if not settles else c for c in body.courses
     ))  # fmt: skip
     base = try_base(body, x, held.course, told.period)
-    spread = np.where(prior.spread < SPREAD, 1.645 * prior.spread, [math.log(4), 0.0, math.log(8)])[[0, 2]]
     frame = frame_of(first, x, told.period)
     tried, every = [], laws(frame, elastic)
     for n, law in enumerate(every):
         progress(0.15 + 0.8 * n / len(every), 1, f"trying {law.term.replace('_', ' ')} ({n + 1} of {len(every)})")
-        found = try_law(law, body, x, spread, held.course, frame)
+        found = try_law(law, body, x, given, held.course, frame)
         tried += [] if found is None else [found]
     progress(0.97, 1, "verdict")
     return written(body, replace(base, spread=numbers.spread), tried, held, told)

@@ -11,9 +11,10 @@ from scipy.optimize import least_squares
 from surgisim.diagnosis.base import HIGH, LOW, TERMS, values_on
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import NOTHING_KEPT, Memo
-from surgisim.diagnosis.prior import USUAL
+from surgisim.diagnosis.prior import SPREAD, USUAL, Prior
 from surgisim.diagnosis.swinging.course import Course, simulate
 from surgisim.diagnosis.swinging.laws import Frame, Law
+from surgisim.estimation.identify import NINETY
 from surgisim.mpm.setup import Values
 from surgisim.mpm.simulator import Breakdown
 from surgisim.physics.catalogue import choose
@@ -26,6 +27,8 @@ LOSSES = (0.02, 0.1, 0.4)
 SWINGS = 1.5
 """Swings in the first window of a base's fit; each window is twice as long as the one before, so that none is a whole
 turn off."""
+WIDER = np.array([math.log(3), 0.0, math.log(10)])
+"""How far beyond a pulled tissue's numbers those of a base are tried: silicone is stiffer, and less viscous."""
 SCANNED = 0.4
 """Share of the fitted frames in which a law's numbers are tried before they are fitted."""
 EVALUATIONS, STEP, FAR, NOUGHT = 6, 0.03, 10.0, 0.1
@@ -105,12 +108,13 @@ class Numbers:
     """Standard deviation, (3,); zero of what was not fitted."""
 
 
-def fit_base(body: Body, period: Callable[[np.ndarray], float], given: np.ndarray | None, say: Say) -> Numbers:
+def fit_base(body: Body, period: Callable[[np.ndarray], float], given: Prior | None, say: Say) -> Numbers:
     """What suits all fitted frames, from short windows to all.
 
-    period: slowest one of a base with these numbers; given: numbers that another recording told, where the fit begins.
+    period: slowest one of a base with these numbers; given: what another recording told, beyond which nothing goes.
     """
-    middle = USUAL.middle.copy() if given is None else given.copy()
+    middle = (USUAL if given is None else given).middle.copy()
+    ends = bounds(given)
     whole = max(course.until for course in body.courses)
     unit = period(middle)
 
@@ -145,7 +149,7 @@ def fit_base(body: Body, period: Callable[[np.ndarray], float], given: np.ndarra
     while True:
         say(f"base over {until} of {whole} frames: E {math.exp(best[0]):.0f} Pa")
         courses = [c.first(until) for c in body.courses]
-        found = _fitted(body, courses, best, free, slow)
+        found = _fitted(body, courses, best, free, slow, ends)
         best = found.x
         if until >= whole:
             return found
@@ -164,7 +168,9 @@ def _first_window(body: Body, whole: int) -> int:
     return int(np.clip(frames, min(8, whole), whole))
 
 
-def _fitted(body: Body, courses: list[Course], x: np.ndarray, free: list[int], slow) -> Numbers:
+def _fitted(
+    body: Body, courses: list[Course], x: np.ndarray, free: list[int], slow, ends: tuple[np.ndarray, np.ndarray]
+) -> Numbers:
     def there(y: np.ndarray) -> np.ndarray:
         moved = x.copy()
         moved[free] = y
@@ -173,12 +179,21 @@ def _fitted(body: Body, courses: list[Course], x: np.ndarray, free: list[int], s
     def left(y: np.ndarray) -> np.ndarray:
         return body.left(courses, body.base(there(y), slow(there(y))), {})
 
-    low, high = np.full(3, -math.inf)[free], np.full(3, math.inf)[free]
-    low[0], high[0] = LOW[0], HIGH[0] + math.log(3)
-    y, fun, jac = descend(left, x[free], np.ones(len(free)), low, high)
+    y, fun, jac = descend(left, x[free], np.ones(len(free)), *(end[free] for end in ends))
     spread = np.zeros(3)
     spread[free] = np.sqrt(np.diag(covariance(fun, jac, independent(courses, slow(there(y))))))
     return Numbers(there(y), spread)
+
+
+def bounds(given: Prior | None) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest numbers of a base that are tried, (3,) each: inside what another recording told, as far as it
+    did."""
+    low, high = LOW - WIDER, HIGH + WIDER
+    if given is not None:
+        told = given.spread < SPREAD
+        low = np.where(told, given.middle - NINETY * given.spread, low)
+        high = np.where(told, given.middle + NINETY * given.spread, high)
+    return low, high
 
 
 def independent(courses: Sequence[Course], period: float) -> float:
@@ -222,10 +237,10 @@ def try_base(body: Body, x: np.ndarray, other: Course | None, period: float) -> 
     return Tried(None, x, np.zeros(0), values, {}, fitted, apart, np.zeros(0))
 
 
-def try_law(law: Law, body: Body, base: np.ndarray, spread: np.ndarray, other: Course, frame: Frame) -> Tried | None:
+def try_law(law: Law, body: Body, base: np.ndarray, given: Prior | None, other: Course, frame: Frame) -> Tried | None:
     """Scan, fit together with the base's modulus, foretell what is held out; None where every run breaks down.
 
-    spread: how far the logarithm of the base's modulus, and of its viscosity over it, may move, (2,).
+    base: the base's own numbers, (3,); given: what another recording told of them.
     """
     whole = max(course.until for course in body.courses)
     scanned = [c.first(whole if body.settles else max(8, round(SCANNED * whole))) for c in body.courses]
@@ -254,8 +269,8 @@ def try_law(law: Law, body: Body, base: np.ndarray, spread: np.ndarray, other: C
     if not np.isfinite(costs).any():
         return None
     y = starts[int(np.argmin(costs))]
-    low = np.concatenate([-spread[: 1 + nearest], law.low])
-    high = np.concatenate([spread[: 1 + nearest], law.high])
+    least, most = (end[[0, 2]][: 1 + nearest] - base[[0, 2]][: 1 + nearest] for end in bounds(given))
+    low, high = np.concatenate([least, law.low]), np.concatenate([most, law.high])
     numbers = np.abs(y[1 + nearest :])
     size = np.concatenate([np.ones(1 + nearest), np.where(numbers > 0, numbers, NOUGHT)])
     try:
