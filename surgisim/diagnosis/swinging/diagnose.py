@@ -70,11 +70,13 @@ def diagnose_swinging(
         replace(c, weight=courses.alike(c.clip, told.period)) if not settles else c for c in body.courses
     ))  # fmt: skip
     base = try_base(body, x, held.course, told.period)
-    frame = frame_of(first, x, told.period)
-    tried, every = [], laws(frame, elastic)
+    # Without the law its numbers went as far as they may to make up for it.
+    start = x if given is None else given.middle
+    frame = frame_of(first, start, told.period)
+    tried, every = [], laws(frame, elastic, settles)
     for n, law in enumerate(every):
         progress(0.15 + 0.8 * n / len(every), 1, f"trying {law.term.replace('_', ' ')} ({n + 1} of {len(every)})")
-        found = try_law(law, body, x, given, held.course, frame)
+        found = try_law(law, body, start, given, held.course, frame)
         tried += [] if found is None else [found]
     progress(0.97, 1, "verdict")
     return written(body, replace(base, spread=numbers.spread), tried, held, told)

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from surgisim.diagnosis.base import HIGH, LOW, TERMS, values_on
 from surgisim.diagnosis.clip import Clip
@@ -31,8 +30,9 @@ WIDER = np.array([math.log(3), 0.0, math.log(10)])
 """How far beyond a pulled tissue's numbers those of a base are tried: silicone is stiffer, and less viscous."""
 SCANNED = 0.4
 """Share of the fitted frames in which a law's numbers are tried before they are fitted."""
-EVALUATIONS, STEP, FAR, NOUGHT = 6, 0.03, 10.0, 0.1
-"""Of a fit at most; step of its differences, over a number's size; where counting begins; size of what begins at 0."""
+EVALUATIONS, TRIES, ENOUGH, STEP, NOUGHT = 8, 4, 3e-3, 0.03, 0.1
+"""Steps of a fit at most, and how often each is tried shorter; share of the squares below which a step is the last one;
+of differences, over a number's size; size of what begins at zero."""
 SETTLING = 1.0
 """Drag by which a body that is seen only at rest gets there, over its slowest angular frequency [1]."""
 Say = Callable[[str], None]
@@ -210,23 +210,46 @@ def covariance(fun: np.ndarray, jac: np.ndarray, count: float) -> np.ndarray:
 def descend(
     left: Callable[[np.ndarray], np.ndarray], start: np.ndarray, size: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Numbers of least squares (N,) near a start, what they leave [mm], and its derivative by numbers over their size.
+    """Numbers of least squares (N,) near a start, what they leave [m], (M,), and its derivative by numbers over their
+    size, (M, N).
 
-    low, high: bounds; size: of a number's change that is worth as much as another's. Raises what `left` does.
+    Levenberg and Marquardt's steps, those of numbers at an end that would go beyond it left out: what hangs on the very
+    end of a body lies at the end of where it may be. low, high: ends; size: of a number's change that is worth as much
+    as another's. Raises what `left` does at the start.
     """
-    # Counted from FAR, so that a relative step is one of the size whatever the number is.
-    edge = 1e-6 * size
-    start = np.clip(start, low + edge, high - edge)
 
-    def of(v: np.ndarray) -> np.ndarray:
-        return start + size * (v - FAR)
+    def off(y: np.ndarray) -> np.ndarray | None:
+        try:
+            return left(y).ravel()
+        except (Breakdown, Misplaced):
+            return None
 
-    bounds = (FAR + (low - start) / size, FAR + (high - start) / size)
-    found = least_squares(
-        lambda v: 1e3 * left(of(v)).ravel(), np.full(len(start), FAR), bounds=bounds, diff_step=STEP / FAR,
-        max_nfev=EVALUATIONS, xtol=1e-4, ftol=1e-3,
-    )  # fmt: skip
-    return of(found.x), found.fun, found.jac
+    y, damping = np.clip(start, low, high), 1e-2
+    now = left(y).ravel()
+    jac = np.zeros((len(now), len(y)))
+    for _ in range(EVALUATIONS):
+        for k, way in enumerate(np.diag(size)):
+            for step in (STEP, -STEP) if y[k] + STEP * size[k] <= high[k] else (-STEP, STEP):
+                moved = off(y + step * way)
+                if moved is not None:
+                    jac[:, k] = (moved - now) / step
+                    break
+        pull = -jac.T @ now
+        free = ~(((y <= low) & (pull < 0)) | ((y >= high) & (pull > 0)))
+        before = float(now @ now)
+        for _ in range(TRIES):
+            normal = jac[:, free].T @ jac[:, free]
+            by = np.zeros(len(y))
+            by[free] = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-30), pull[free])
+            there = np.clip(y + by * size, low, high)
+            tried = off(there)
+            if tried is not None and tried @ tried < before:
+                y, now, damping = there, tried, max(damping / 8, 1e-4)
+                break
+            damping *= 8
+        if before - float(now @ now) < ENOUGH * before:
+            break
+    return y, now, jac
 
 
 def try_base(body: Body, x: np.ndarray, other: Course | None, period: float) -> Tried:

@@ -89,13 +89,17 @@ def frame_of(clip: Clip, x: np.ndarray, period: float) -> Frame:
     return Frame(free, held, down, mass, mass * (size or 9.81), period, float(np.exp(x[0])))
 
 
-def laws(frame: Frame, elastic: bool) -> list[Law]:
-    """All that are tried; elastic: whether the base has no viscosity, which is then one of them."""
-    found = [_relaxation(frame), _drag(frame), _mass(frame), _tilt(frame), _lump(frame), _part(frame)]
-    found += [_stiffening(frame)]
-    if frame.down.any():
-        found.append(_push(frame))
-    return [_viscosity(frame), *found] if elastic else found
+def laws(frame: Frame, elastic: bool, settles: bool) -> list[Law]:
+    """All that are tried.
+
+    elastic: whether the base has no viscosity, which is then one of them; settles: whether only where the body came to
+    rest is seen, of which what takes energy out says nothing.
+    """
+    found = [_mass(frame), _tilt(frame), _lump(frame), _part(frame), _stiffening(frame)]
+    found += [_push(frame)] if frame.down.any() else []
+    if settles:
+        return found
+    return [*([_viscosity(frame)] if elastic else []), _relaxation(frame), _drag(frame), *found]
 
 
 def _viscosity(f: Frame) -> Law:
