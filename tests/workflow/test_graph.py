@@ -202,6 +202,7 @@ CONCEALED |= {
 AGAIN = {
     "verification",
     "verification_case",
+    "known_base",
     "known_diagnosis",
     "known_report",
     "clip_diagnosis",
