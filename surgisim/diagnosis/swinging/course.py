@@ -15,6 +15,9 @@ from surgisim.physics.place import Place
 
 FLOOR = 1e-4
 """Swing below which points are as good as still [m]."""
+CREEPS, LEAST_SWINGS = (1.5, 8.0), 4.0
+"""Time constants of creep, and how long a course must be for it to be told from a swing, in periods. Silicone sinks on
+for a second once it is let go; a modulus that makes up for that swings too slowly (of the beam by 2 %)."""
 BETWEEN = 0.1
 """Share of frames between the first and the last seen one below which only where a body came to rest is seen."""
 
@@ -30,6 +33,8 @@ class Course:
     """Which frames count, (T,) bool."""
     weight: np.ndarray
     """(T,)"""
+    period: float = np.inf
+    """Of a swing [s]; infinite where nothing creeps."""
 
     @property
     def until(self) -> int:
@@ -51,8 +56,20 @@ class Course:
         return (self.clip.moved[:, :n] - moved[:, :n])[self.seen[:, :n]]
 
     def weighted(self, moved: np.ndarray) -> np.ndarray:
-        n = self.until
-        return self.left(moved) * np.broadcast_to(self.weight, self.seen.shape)[:, :n][self.seen[:, :n]][:, None]
+        """The same times the frames' weights, less what each point may creep, (M, 3)."""
+        n, seen = self.until, self.seen[:, : self.until]
+        left = np.where(seen[..., None], self.clip.moved[:, :n] - moved[:, :n], 0.0) * self.weight[:n, None]
+        if n >= LEAST_SWINGS * self.period * self.clip.fps:
+            slow = self.creep(n) * self.weight[:n, None]
+            for k in range(len(left)):
+                own = np.linalg.qr(slow * seen[k, :, None])[0]
+                left[k] -= own @ (own.T @ left[k])
+        return left[seen]
+
+    def creep(self, frames: int) -> np.ndarray:
+        """How a body may sink further once it is let go, (frames, 2): softer than it swings, it takes its time."""
+        time = np.arange(frames) / self.clip.fps
+        return 1 - np.exp(-time[:, None] / (self.period * np.array(CREEPS)))
 
     def rms(self, moved: np.ndarray) -> float:
         """Distance [m]."""
@@ -63,7 +80,7 @@ def fitted(clip: Clip, period: float) -> Course:
     """The fitted frames, under weights by which late swings count as much as first ones."""
     frames = np.arange(clip.frames) < clip.until
     # In the frame in which it is let go nothing has moved.
-    return Course(clip, np.ones(len(clip.kept), bool), frames & (clip.seen.any(0)), alike(clip, period))
+    return Course(clip, np.ones(len(clip.kept), bool), frames & clip.seen.any(0), alike(clip, period), period)
 
 
 def kept_out(clip: Clip) -> Course:
@@ -93,10 +110,19 @@ def comes_to_rest(clip: Clip) -> bool:
     return bool(between.size) and between.any(0).mean() < BETWEEN
 
 
+def turned(clip: Clip) -> int | None:
+    """Frame in which the liveliest component of a body let go first turns round; None where it does not."""
+    path = np.where(clip.seen[..., None], clip.moved, 0.0)[:, : clip.until]
+    k, a = np.unravel_index(np.ptp(path, axis=1).argmax(), (len(path), 3))
+    step = np.sign(np.diff(path[k, :, a]))
+    turns = 1 + np.flatnonzero(step[1:] * step[:-1] < 0)
+    return int(turns[0]) if len(turns) else None
+
+
 def alike(clip: Clip, period: float) -> np.ndarray:
     """One over how far points go within the period around a frame, no less than FLOOR, largest 1, (T,)."""
     path = np.where(clip.seen[..., None], clip.moved, np.nan)
-    span = int(np.clip(round(clip.fps * period), 2, clip.frames))
+    span = int(np.clip(np.round(clip.fps * period), 2, clip.frames))
     first = np.clip(np.arange(clip.frames) - span // 2, 0, clip.frames - span)
     swing = np.full(clip.frames, np.nan)
     for t, begin in enumerate(first):

@@ -60,15 +60,15 @@ def diagnose_swinging(
     prior = prior_of(first.recording)
     given = prior if first.recording.expected else None
     elastic, settles = settings.base == "elastic", all(courses.comes_to_rest(c) for c in clips)
-    rough = tuple(courses.fitted(c, _liveliest_period(c)) for c in clips)
+    rough = tuple(courses.fitted(c, np.inf if settles else _liveliest_period(c)) for c in clips)
     body, held = _held_out(Body(rough, elastic, settles, memo), held_out, settings)
     say = lambda text: progress(0.02, 1, text)  # noqa: E731
     numbers = fit_base(body, lambda x: slowest_period(first, x), given, say)
     x = numbers.x
     told = responses(first, x)
-    body = replace(body, courses=tuple(
-        replace(c, weight=courses.alike(c.clip, told.period)) if not settles else c for c in body.courses
-    ))  # fmt: skip
+    if not settles:
+        swung = (replace(c, weight=courses.alike(c.clip, told.period), period=told.period) for c in body.courses)
+        body = replace(body, courses=tuple(swung))
     base = try_base(body, x, held.course, told.period)
     # Without the law its numbers went as far as they may to make up for it.
     start = x if given is None else given.middle
@@ -99,8 +99,8 @@ def same_body(first: Clip, others: Sequence[Clip]) -> None:
 
 
 def _liveliest_period(clip: Clip) -> float:
-    """A first guess, until the base is known: a fifth of the clip [s]."""
-    return clip.until / clip.fps / 5
+    """As the recording shows it [s]: twice the time of the first turn; the whole clip where nothing turns round."""
+    return 2 * (courses.turned(clip) or clip.until / 2) / clip.fps
 
 
 def _held_out(body: Body, recording: Recording | None, settings: Diagnosing) -> tuple[Body, HeldOut]:

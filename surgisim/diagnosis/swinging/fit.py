@@ -11,7 +11,7 @@ from surgisim.diagnosis.base import HIGH, LOW, TERMS, values_on
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import NOTHING_KEPT, Memo
 from surgisim.diagnosis.prior import SPREAD, USUAL, Prior
-from surgisim.diagnosis.swinging.course import Course, simulate
+from surgisim.diagnosis.swinging.course import Course, simulate, turned
 from surgisim.diagnosis.swinging.laws import Frame, Law
 from surgisim.estimation.identify import NINETY
 from surgisim.mpm.setup import Values
@@ -116,6 +116,9 @@ def fit_base(body: Body, period: Callable[[np.ndarray], float], given: Prior | N
     middle = (USUAL if given is None else given).middle.copy()
     ends = bounds(given)
     whole = max(course.until for course in body.courses)
+    if body.elastic and not body.settles:
+        # What loses nothing swings like what does only for a while.
+        whole = min(whole, 2 * _first_window(body, whole))
     unit = period(middle)
 
     def of(log_E: float, lag: float | None = None) -> np.ndarray:
@@ -158,13 +161,9 @@ def fit_base(body: Body, period: Callable[[np.ndarray], float], given: Prior | N
 
 def _first_window(body: Body, whole: int) -> int:
     """Frames of the first SWINGS, by how often the body's liveliest component turns round."""
-    clip = body.clip
-    path = np.where(clip.seen[..., None], clip.moved, 0.0)[:, : clip.until]
-    k, a = np.unravel_index(np.ptp(path, axis=1).argmax(), (len(path), 3))
-    step = np.sign(np.diff(path[k, :, a]))
-    turns = 1 + np.flatnonzero(step[1:] * step[:-1] < 0)
+    turn = turned(body.clip)
     # A first turn is half a swing from where it was let go.
-    frames = 2 * SWINGS * turns[0] if len(turns) else whole
+    frames = whole if turn is None else round(2 * SWINGS * turn)
     return int(np.clip(frames, min(8, whole), whole))
 
 
@@ -297,6 +296,8 @@ def try_law(law: Law, body: Body, base: np.ndarray, given: Prior | None, other: 
     numbers = np.abs(y[1 + nearest :])
     size = np.concatenate([np.ones(1 + nearest), np.where(numbers > 0, numbers, NOUGHT)])
     try:
+        if not body.settles:
+            y, _, _ = descend(lambda y: left(y, scanned), y, size, low, high)
         y, fun, jac = descend(lambda y: left(y, body.courses), y, size, low, high)
     except (Breakdown, Misplaced):
         return None
