@@ -28,8 +28,9 @@ SWINGS = 1.5
 turn off."""
 WIDER = np.array([math.log(3), 0.0, math.log(10)])
 """How far beyond a pulled tissue's numbers those of a base are tried: silicone is stiffer, and less viscous."""
-SCANNED = 0.4
-"""Share of the fitted frames in which a law's numbers are tried before they are fitted."""
+SCANNED, HELPS = 0.4, 0.9
+"""Share of the fitted frames in which a law's numbers are tried and fitted first, and of the base's squares there that
+it may leave to be fitted to all of them."""
 EVALUATIONS, TRIES, ENOUGH, STEP, NOUGHT = 8, 4, 3e-3, 0.03, 0.1
 """Steps of a fit at most, and how often each is tried shorter; share of the squares below which a step is the last one;
 of differences, over a number's size; size of what begins at zero."""
@@ -296,9 +297,11 @@ def try_law(law: Law, body: Body, base: np.ndarray, given: Prior | None, other: 
     numbers = np.abs(y[1 + nearest :])
     size = np.concatenate([np.ones(1 + nearest), np.where(numbers > 0, numbers, NOUGHT)])
     try:
-        if not body.settles:
-            y, _, _ = descend(lambda y: left(y, scanned), y, size, low, high)
-        y, fun, jac = descend(lambda y: left(y, body.courses), y, size, low, high)
+        some = body.courses if body.settles else scanned
+        alone = float((body.left(some, body.base(base, frame.period), {}) ** 2).sum())
+        y, fun, jac = descend(lambda y: left(y, some), y, size, low, high)
+        if not body.settles and float(fun @ fun) < HELPS * alone:
+            y, fun, jac = descend(lambda y: left(y, body.courses), y, size, low, high)
     except (Breakdown, Misplaced):
         return None
     spread_of = size * np.sqrt(np.diag(covariance(fun, jac, independent(body.courses, frame.period))))
