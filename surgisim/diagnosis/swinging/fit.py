@@ -28,9 +28,8 @@ SWINGS = 1.5
 turn off."""
 WIDER = np.array([math.log(3), 0.0, math.log(10)])
 """How far beyond a pulled tissue's numbers those of a base are tried: silicone is stiffer, and less viscous."""
-SCANNED, HELPS = 0.4, 0.9
-"""Share of the fitted frames in which a law's numbers are tried and fitted first, and of the base's squares there that
-it may leave to be fitted to all of them."""
+HELPS = 0.9
+"""Share of the base's squares in the second window that a law may leave to be fitted to all frames; chosen."""
 EVALUATIONS, TRIES, ENOUGH, STEP, NOUGHT = 8, 4, 3e-3, 0.03, 0.1
 """Steps of a fit at most, and how often each is tried shorter; share of the squares below which a step is the last one;
 of differences, over a number's size; size of what begins at zero."""
@@ -266,7 +265,9 @@ def try_law(law: Law, body: Body, base: np.ndarray, given: Prior | None, other: 
     base: the base's own numbers, (3,); given: what another recording told of them.
     """
     whole = max(course.until for course in body.courses)
-    scanned = [c.first(whole if body.settles else max(8, round(SCANNED * whole))) for c in body.courses]
+    # A law that changes the pitch is whole turns off in a long window: the first one is short, as a base's.
+    first = whole if body.settles else _first_window(body, whole)
+    scanned, some = ([c.first(n) for c in body.courses] for n in (first, min(2 * first, whole)))
     nearest = 0 if body.elastic or body.settles else 1
 
     def made(y: np.ndarray) -> tuple[Values, dict[str, Place]]:
@@ -297,7 +298,6 @@ def try_law(law: Law, body: Body, base: np.ndarray, given: Prior | None, other: 
     numbers = np.abs(y[1 + nearest :])
     size = np.concatenate([np.ones(1 + nearest), np.where(numbers > 0, numbers, NOUGHT)])
     try:
-        some = body.courses if body.settles else scanned
         alone = float((body.left(some, body.base(base, frame.period), {}) ** 2).sum())
         y, fun, jac = descend(lambda y: left(y, some), y, size, low, high)
         if not body.settles and float(fun @ fun) < HELPS * alone:

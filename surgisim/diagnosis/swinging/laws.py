@@ -156,7 +156,7 @@ def _lump(f: Frame) -> Law:
     def make(x):
         return {"stiff_inclusion": {"s": x[0]}}, {"stiff_inclusion": f.somewhere(x[1])}
 
-    return Law("stiff_inclusion", make, ((0.2, 4.0), ALONG), (0.05, 0.0), (50.0, 1.0))
+    return Law("stiff_inclusion", make, ((0.2, 4.0), ALONG), (0.06, 0.0), (16.0, 1.0))
 
 
 def _part(f: Frame) -> Law:
