@@ -17,7 +17,7 @@ def main(*, settings, progress):
     from surgisim.verification.cases import data
 
     known = chosen(settings.case)
-    files = encoded_recording(known.convert(data(known.data)))
+    files = encoded_recording(known.part(settings.part)(data(known.data)))
     return tuple(files[f"{name}{suffix}"] for name, suffix in FILES.items())
 
 

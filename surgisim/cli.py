@@ -125,7 +125,9 @@ def demo(
 
 @app.command()
 def diagnose(
-    recording: Annotated[Path, typer.Argument(help="A recording folder (docs/diagnosis.md).")],
+    recording: Annotated[
+        list[Path], typer.Argument(help="A recording folder (docs/diagnosis.md); several of one body that swings.")
+    ],
     out: Annotated[
         Path,
         typer.Option(help="Folder for diagnosis.html, diagnosis.json, physics.json, mismatch.npz and mismatch.ply."),
@@ -134,6 +136,12 @@ def diagnose(
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="A key of config.yaml's section 'diagnosis'; repeatable."),
+    ] = None,
+    base: Annotated[
+        Path | None, typer.Option(help="The physics.json in which another recording told of this body's base.")
+    ] = None,
+    hold_out: Annotated[
+        Path | None, typer.Option(help="The folder of another recording of this body, foretold and never fitted.")
     ] = None,
     debug: Debug = False,
 ) -> None:
@@ -145,9 +153,10 @@ def diagnose(
     from surgisim.report.diagnosed.page import page
 
     with plain_errors(debug):
-        typer.echo(carry_out(recording, out, of_diagnosis(tuple(config or ()), tuple(set_ or ()))))
+        settings = of_diagnosis(tuple(config or ()), tuple(set_ or ()))
+        typer.echo(carry_out(recording, out, settings, base, hold_out))
         files = (out / name for name in ("diagnosis.json", "mismatch.npz", "physics.json"))
-        case = read(recording, *files)
+        case = read(recording[0], *files)
         save_bytes({out / "diagnosis.html": page(case, case.made(), progress=Progress("page"))})
         typer.echo(f"{out / 'diagnosis.html'} shows it.")
 

@@ -47,12 +47,19 @@ class Diagnosis(JsonArtifact):
     degrees of freedom, one number or one a frame."""
     untold: list[str] = field(default_factory=list)
     """Parameters that this recording does not tell: at a bound of what was tried, or hardly surer than beforehand."""
-
     residual: dict[str, Any] = field(default_factory=dict)
     """Where nothing is named, what was modelled without a name: laws (each as an effect), character
     (artifacts/character.py), numbers (how many), log_evidence, fit and held_out (as above, before and after), helps
     (whether the frames held out come nearer; only then physics.json has it) and words. Empty where that was not tried.
     """
+    as_given: list[str] = field(default_factory=list)
+    """Parameters of which something was known of this body beforehand, and which the recording makes hardly surer."""
+    forces: dict[str, Any] = field(default_factory=dict)
+    """Beside the base: count, largest, simulated_there and rms_left of measured forces, unit; empty if none."""
+    foretold: dict[str, Any] = field(default_factory=dict)
+    """Of another recording that was never fitted: its name, RMS before and after what is named, unit; {} if none."""
+    elsewhere: dict[str, Any] = field(default_factory=dict)
+    """The base that another recording told: file, numbers (low, high, unit by name), passed_over laws; {} if none."""
 
     def __post_init__(self) -> None:
         check(self.verdict in VERDICTS, f"Diagnosis: verdict '{self.verdict}' is none of {VERDICTS}.")

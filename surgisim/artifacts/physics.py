@@ -29,6 +29,9 @@ class Physics(JsonArtifact):
     places: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Law -> {"center" [m], "extent" [m], "normal" or null} for laws that act in one place only."""
 
+    ratios: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Of numbers that are told together better than apart, such as "eta / E": {"value", "low", "high", "unit"}."""
+
     UNITS = {"density": "kg/m^3", "gravity": "m/s^2"}
 
     def __post_init__(self) -> None:

@@ -23,6 +23,9 @@ class Diagnosing(Settings):
     replay: float = Field(0.13, gt=0.04, le=0.5)
     """The same of the runs whose errors are shown, before and after, and of a second search where the first sees that
     something is hidden and not what; neither is made where it is no finer than `grid` [1]."""
+    base: Literal["viscous", "elastic"] = "viscous"
+    """What the simulation has already: E, nu and viscosity, or E and nu alone, so that damping may be missing; elastic
+    only for bodies that swing [-]."""
     nulls: int = Field(24, ge=4, le=400)
     """Residuals of nothing but noise that go through the same search [1]."""
     refine: int = Field(4, ge=1, le=16)

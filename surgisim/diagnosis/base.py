@@ -5,19 +5,23 @@ Its numbers x are log E, nu and log eta / E, and may be followed by the moments 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from surgisim.diagnosis import calibration
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
-from surgisim.diagnosis.prior import SPREAD, START, Prior
+from surgisim.diagnosis.prior import SPREAD, START, USUAL, Prior
 from surgisim.diagnosis.tangent import Tangent
 from surgisim.mpm.closing import follow
 from surgisim.mpm.grip import Drive
 from surgisim.mpm.setup import Prepared, Values
 from surgisim.mpm.simulator import Breakdown, Run
 from surgisim.problem import Problem
+
+if TYPE_CHECKING:
+    from surgisim.diagnosis.pulls import Pulls
 
 TERMS = ("neo_hookean_ciarlet", "newtonian")
 LOW, HIGH = np.array([np.log(2e2), 0.30, np.log(5e-5)]), np.array([np.log(1e6), 0.49, np.log(5e-2)])
@@ -87,6 +91,10 @@ class Base:
     known: Known
     bound: tuple[str, ...] = ()
     """Numbers that came to the end of what is tried."""
+    prior: Prior = USUAL
+    """What was known of its numbers beforehand."""
+    pulls: "Pulls | None" = None
+    """Forces, where any were measured."""
 
     @property
     def spread(self) -> np.ndarray:
@@ -98,6 +106,11 @@ class Base:
         """Names of numbers that the recording does not tell: at an end of what is tried, or hardly surer."""
         vague = self.spread > TOLD * SPREAD
         return tuple(name for name, v in zip(NAMES, vague, strict=True) if v or name in self.bound)
+
+    @property
+    def as_given(self) -> tuple[str, ...]:
+        """Names of numbers that the recording makes hardly surer than they were known beforehand."""
+        return tuple(name for name, v in zip(NAMES, self.spread > TOLD * self.prior.spread, strict=True) if v)
 
 
 def values_of(x: np.ndarray) -> Values:

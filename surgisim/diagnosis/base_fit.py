@@ -29,6 +29,8 @@ from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Whitener
+from surgisim.diagnosis.prior import USUAL
+from surgisim.diagnosis.pulls import Pulls, pulls
 from surgisim.diagnosis.ring_down import ASIDE, DRAWS, Descent, RingDown, aside, softest, told
 from surgisim.diagnosis.tangent import Tangent, base_piola, tangent
 from surgisim.estimation.trial import at_once
@@ -130,6 +132,11 @@ class Ran:
         """Derivative of the points' displacement by nu [m], (K, T_fit, 3)."""
         return _by_poisson(self.laid.bodies[0], near, self.clip.on_grid(self.x))
 
+    def pulls(self, memo: Memo) -> Pulls | None:
+        """Forces near this run on the finer grid, where any were measured."""
+        finer = self.finer
+        return pulls(finer.clip, finer.bodies[0], self.x, self.finer_run, lambda x: finer.run(x, memo)[1])
+
     def metric(self, nuisances: Nuisances, error: np.ndarray) -> Metric:
         gradient = displacement_gradient(self.laid.bodies[0], self.clip, self.run)
         return metric(nuisances(self.clip, self.simulated, gradient, error))
@@ -167,7 +174,7 @@ def fit_base(
             space = ran.metric(nuisances, ran.error)
         around = RingDown(
             ran.finer.clip, whiten, space, memo, ran.finer.bodies, ran.finer.carry, y, ran.finer_run,
-            ran.finer_simulated[:, : clip.until], ran.by_poisson(near),
+            ran.finer_simulated[:, : clip.until], ran.by_poisson(near), ran.pulls(memo),
         )  # fmt: skip
         if n > 0:
             cost = around.cost(y, around.left(y))
@@ -181,11 +188,14 @@ def fit_base(
             y = _on(around, y, say)
         promised = around.cost(y, around.left(y))
     slopes = around.slopes(y)
-    known = Known(np.linalg.inv(around.normal(slopes))[:3, :3], others)
+    known = Known(np.linalg.inv(around.normal(slopes, y))[:3, :3], others)
     units = slopes[:3] * clip.prior.spread[:, None, None, None]
     clip = ran.clip.less(None if ran.finer is laid else ran.error)
     bound = at_bound(ran.x, clip)
-    return clip, Base(ran.x, laid.bodies[0], ran.drive, ran.run, ran.simulated, near, units, known, bound), ran.finer
+    base = Base(
+        ran.x, laid.bodies[0], ran.drive, ran.run, ran.simulated, near, units, known, bound, clip.prior, around.pulls
+    )
+    return clip, base, ran.finer
 
 
 def _all_over(
@@ -199,6 +209,7 @@ def _all_over(
     around = RingDown(
         clip, whiten, ran.metric(nuisances, error), memo, ran.laid.bodies, ran.laid.carry,
         np.concatenate([ran.x, late]), ran.run, ran.simulated[:, : clip.until], ran.by_poisson(ran.tangent()),
+        ran.pulls(memo),
     )  # fmt: skip
     return around.descents(say)
 
@@ -277,21 +288,31 @@ def settled(
     fine: the grid that it is fitted on; space: with the base's own slopes in columns `slopes`, each at a prior standard
     deviation.
     """
-    until, x, spread = clip.until, base.x, clip.prior.spread
+    until, x, spread, forces = clip.until, base.x, clip.prior.spread, base.pulls
+    open_to = np.linalg.inv(np.eye(space.columns.shape[1]) + (space.columns.T @ space.columns).astype(float))
+    surely = np.linalg.inv(open_to[slopes, slopes])
     observed = clip.less(None).moved[:, :until]
 
-    def misfit(there: np.ndarray) -> tuple[float, np.ndarray]:
+    def misfit(there: np.ndarray, x: np.ndarray) -> tuple[float, np.ndarray]:
         z = whiten(observed - there[:, :until])
-        return float(space.gram(z[:, None], z[:, None])[0, 0]), space.likely(z)[slopes]
+        cost, likely = float(space.gram(z[:, None], z[:, None])[0, 0]), space.likely(z)[slopes]
+        # The metric's prior is about the base as it was fitted; what is known of this body is about its own middle.
+        off = np.where(clip.prior.spread < USUAL.spread, (x - clip.prior.middle) / spread, 0.0)
+        cost, likely = cost + float(off @ off), likely - np.linalg.solve(surely, off)
+        if forces is None:
+            return cost, likely
+        J = forces.slopes(x) * spread
+        both = np.linalg.solve(surely + J.T @ J, surely @ likely + J.T @ forces.left(x))
+        return cost + forces.cost(x), both
 
     plain = base.simulated if clip.error is None else base.simulated + clip.error
-    least, likely = misfit(plain)
+    least, likely = misfit(plain, x)
     for _ in range(NEWTONS):
         tried = bounded(x + np.clip(likely, -1, 1) * spread, clip)
         found = None if np.abs((tried - x) / spread).max() < SETTLED else _ran(fine, tried, memo)
         if found is None:
             break
-        cost, likely = misfit(found[2])
+        cost, likely = misfit(found[2], tried)
         if cost > least - 1.0:
             break
         x, plain, least = tried, found[2], cost
@@ -301,8 +322,9 @@ def settled(
         near = tangent(base.prepared, values_on(clip, x), drive, run, clip.rest, until)
         base = replace(base, x=x, drive=drive, run=run, simulated=simulated, tangent=near)
         clip = clip.less(None if clip.error is None else plain - simulated)
-    open_to = np.linalg.inv(np.eye(space.columns.shape[1]) + (space.columns.T @ space.columns).astype(float))
-    told = (np.linalg.inv(open_to[slopes, slopes]) - np.eye(3)) / calibration.ALIKE_ERRORS
+    told = (surely - np.eye(3)) / calibration.ALIKE_ERRORS
+    if forces is not None:
+        told = told + (forces.slopes(x) * spread).T @ (forces.slopes(x) * spread)
     near = np.linalg.inv(np.eye(3) + told) * np.outer(spread, spread) + softness(clip)
     return clip, replace(base, known=replace(base.known, near=near), bound=at_bound(x, clip))
 

@@ -220,7 +220,9 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
     for center, radius in zip(motion.center_rest, motion.radius, strict=True):
         usable &= np.linalg.norm(rest - center, axis=1) > CLEAR * radius
     usable &= ~motion.on_rim(rest)
-    usable &= recording.visible[:, :until].mean(1) > LEAST_SEEN
+    often = recording.visible[:, :until].mean(1)
+    # Of what hangs at rest one picture may be all there is.
+    usable &= often > min(LEAST_SEEN, 0.5 * often.max(initial=0.0))
     kept = np.flatnonzero(usable)
     if len(kept) < 4:
         away = float(np.median(near))

@@ -79,6 +79,12 @@ def told(case: Case, after: np.ndarray | None = None) -> list[str]:
         said.append(f"What is held seems to end {1e3 * abs(case.clip.raised):.1f} mm {way} its box.")
     for name in case.base.bound:
         said.append(f"{name} came to the end of what is tried: the recording does not tell it.")
+    if case.base.pulls is not None:
+        forces = case.base.pulls.told(case.base.x)
+        said.append(
+            f"Its moduli follow {forces['count']} measured components of force: the largest is "
+            f"{forces['largest']:.3g} N, simulated {forces['simulated_there']:.3g} N."
+        )
     if "E" in case.base.untold and "E" not in case.base.bound:
         E = base_numbers(case.base)["E"]
         said.append(

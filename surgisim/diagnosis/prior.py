@@ -10,10 +10,11 @@ from surgisim.recordings.recording import Recording
 START = np.array([np.log(5e3), 0.45, np.log(2e-3)])
 """log E [Pa], nu, log eta / E [s]: soft tissue and silicone gels lie between 1 and 50 kPa and .3 and 20 ms."""
 SPREAD = np.array([1.2, 0.03, 1.4])
-LOGARITHMIC = {"E": 0, "eta / E": 2}
-"""Numbers that may be known beforehand, and where they stand: of Poisson's ratio a coarse grid has one of its own."""
-SUREST = 0.15
-"""Least spread of a number that is known beforehand, for another grid and a body of another form; chosen."""
+PLACES = {"E": 0, "nu": 1, "eta / E": 2}
+"""Where numbers that may be known beforehand stand; all but nu are logarithms."""
+SUREST, SUREST_RATIO = 0.15, 0.01
+"""Least spread of a number that is known beforehand, a logarithm or nu, for another grid and a body of another form;
+chosen. Of nu a coarse grid has one of its own, so that only a diagnosis' base is a prior for another's."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,8 @@ def prior_of(recording: Recording) -> Prior:
     """
     middle, spread = USUAL.middle.copy(), USUAL.spread.copy()
     for name, (low, high) in recording.expected.items():
-        k = LOGARITHMIC[name]
-        middle[k] = 0.5 * (np.log(low) + np.log(high))
-        spread[k] = np.clip((np.log(high) - np.log(low)) / (2 * NINETY), SUREST, SPREAD[k])
+        k, least = PLACES[name], SUREST_RATIO if name == "nu" else SUREST
+        low, high = (low, high) if name == "nu" else (np.log(low), np.log(high))
+        middle[k] = 0.5 * (low + high)
+        spread[k] = np.clip((high - low) / (2 * NINETY), least, SPREAD[k])
     return Prior(middle, spread)

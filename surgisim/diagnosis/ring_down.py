@@ -18,6 +18,8 @@ from surgisim.diagnosis.clip import OPENS, Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric
 from surgisim.diagnosis.noise import Whitener
+from surgisim.diagnosis.prior import USUAL
+from surgisim.diagnosis.pulls import Pulls
 from surgisim.estimation.trial import at_once
 from surgisim.mpm.setup import Prepared
 from surgisim.mpm.simulator import Breakdown, Run
@@ -60,6 +62,8 @@ class Descent:
     left: np.ndarray | None
     """Whitened residual, (N,); None where tissue like that is torn apart."""
     cost: float
+    owed: float = 0.0
+    """Of the cost, what its numbers owe to what is known of this body beforehand, beyond any tissue's."""
     damping: float = 1e-2
     done: bool = False
 
@@ -82,6 +86,8 @@ class RingDown:
     simulated: np.ndarray
     """Of the run [m], (K, T_fit, 3)."""
     by_poisson: np.ndarray
+    pulls: Pulls | None = None
+    """Forces near that run, where any were measured."""
 
     @property
     def middle(self) -> np.ndarray:
@@ -125,7 +131,8 @@ class RingDown:
         if left is None:
             return np.inf
         prior = (((y - self.middle) / self.reach) ** 2).sum()
-        return float(self.space.gram(left[:, None], left[:, None])[0, 0] + prior)
+        forces = 0.0 if self.pulls is None else self.pulls.cost(y)
+        return float(self.space.gram(left[:, None], left[:, None])[0, 0] + prior + forces)
 
     def slopes(self, y: np.ndarray) -> np.ndarray:
         """Derivative of the points' displacement by y [m], (3 + R, K, T_fit, 3)."""
@@ -138,9 +145,20 @@ class RingDown:
         stiffer, slower, *later = ((m - middle) / a for m, a in zip(moved, aside, strict=True))
         return np.stack([stiffer, self.by_poisson, slower, *later])
 
-    def normal(self, slopes: np.ndarray) -> np.ndarray:
+    def normal(self, slopes: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Second derivative of half the cost at y by y, (3 + R, 3 + R)."""
         J = self.whiten(slopes).T
-        return self.space.gram(J, J) + np.diag(1 / self.reach**2)
+        normal = self.space.gram(J, J) + np.diag(1 / self.reach**2)
+        if self.pulls is not None:
+            normal[:3, :3] += self.pulls.slopes(y).T @ self.pulls.slopes(y)
+        return normal
+
+    def pull(self, slopes: np.ndarray, at: "Descent") -> np.ndarray:
+        """Less the first derivative of half the cost where a descent is, (3 + R,)."""
+        pull = self.space.gram(self.whiten(slopes).T, at.left[:, None])[:, 0] - (at.y - self.middle) / self.reach**2
+        if self.pulls is not None:
+            pull[:3] += self.pulls.slopes(at.y).T @ self.pulls.left(at.y)
+        return pull
 
     def steady(self) -> np.ndarray:
         """Where the run began, with the nu that pull and hold ask for, which hardly depends on the other numbers."""
@@ -153,9 +171,14 @@ class RingDown:
         y[1] += (float(self.space.gram(J, left[:, None])[0, 0]) - (y[1] - middle) * sure) / normal
         return self.bounded(y)
 
+    def owed(self, y: np.ndarray) -> float:
+        """Cost of numbers, (3 + R,), by the clip's own prior beyond that by any tissue's."""
+        mine, usual = (float((((y[:3] - p.middle) / p.spread) ** 2).sum()) for p in (self.clip.prior, USUAL))
+        return mine - usual
+
     def begun(self, y: np.ndarray, body: int = 0) -> Descent:
         left = self.left(y, body)
-        return Descent(y, left, self.cost(y, left))
+        return Descent(y, left, self.cost(y, left), self.owed(y))
 
     def starts(self) -> list[Descent]:
         """Where the run began, and the best viscosity and moment of release for each stiffness."""
@@ -203,8 +226,7 @@ class RingDown:
                 return
             say(f"base: {told(at.y)}")
             slopes = self.slopes(at.y)
-            normal = self.normal(slopes)
-            pull = self.space.gram(self.whiten(slopes).T, at.left[:, None])[:, 0] - (at.y - self.middle) / self.reach**2
+            normal, pull = self.normal(slopes, at.y), self.pull(slopes, at)
             before = at.cost
             if not self._downhill(at, normal, pull):
                 at.done = True
@@ -224,7 +246,8 @@ class RingDown:
                 step[:free] = np.linalg.solve(inner + more * np.diag(np.diag(inner)), pull[:free])
                 there = self.begun(self.bounded(at.y + np.clip(step, -1.2 * self.reach, 1.2 * self.reach)))
                 if there.cost < at.cost:
-                    at.y, at.left, at.cost, at.damping = there.y, there.left, there.cost, max(more / 4, 1e-4)
+                    at.y, at.left, at.cost, at.owed = there.y, there.left, there.cost, there.owed
+                    at.damping = max(more / 4, 1e-4)
                     return True
                 more *= 8
         return False
@@ -237,9 +260,11 @@ def softest(ends: list[Descent]) -> Descent:
 
 def aside(ends: list[Descent], heat: float = calibration.ALIKE_ERRORS) -> np.ndarray:
     """How far x is from the chosen body where descents ended, each drawn as often as its chi square, divided by
-    `heat`, says, (DRAWS, 3)."""
+    `heat`, and what is known of this body beforehand say, (DRAWS, 3)."""
     chosen = softest(ends)
-    weight = np.exp(-0.5 * np.maximum([d.cost - chosen.cost for d in ends], 0) / heat)
+    seen = np.array([d.cost - d.owed - (chosen.cost - chosen.owed) for d in ends])
+    known = np.array([d.owed - chosen.owed for d in ends])
+    weight = np.exp(-0.5 * np.maximum(seen / heat + known, 0))
     drawn = np.random.default_rng(0).choice(len(ends), DRAWS, p=weight / weight.sum())
     return np.stack([d.y[:3] - chosen.y[:3] for d in ends])[drawn]
 

@@ -95,6 +95,23 @@ class Tangent:
 def tangent(prepared: Prepared, values: Values, drive: Drive, run: Run, points: np.ndarray, until: int) -> Tangent:
     """Of a base run, for points at rest [m], (K, 3), and frames before `until`."""
     simulator = prepared.simulator
+    value, slope = operators(prepared)
+    carry = simulator.carry(points)
+    read = sparse.kron(carry, sparse.identity(3)).tocsr()
+    frames, share = states_of(run, drive, until)
+    answers = []
+    for frame in frames:
+        K = stiffness(prepared, values, drive, run.u[frame].astype(float), _hold(drive, frame), slope, value)
+        try:
+            answers.append(cho_solve(cho_factor(K, overwrite_a=False), read.T.toarray(), overwrite_b=True).T)
+        except LinAlgError:
+            answers.append(lu_solve(lu_factor(K), read.T.toarray()).T)
+    return Tangent(prepared, values, drive, run, frames, share, np.stack(answers), slope, value)
+
+
+def operators(prepared: Prepared) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    """From nodal displacements to the particles', (3 P, 3 A), and to their gradients, (9 P, 3 A)."""
+    simulator = prepared.simulator
     index, link = simulator.rest_links
     count, links = index.shape
     nodes = len(simulator.place)
@@ -104,17 +121,7 @@ def tangent(prepared: Prepared, values: Values, drive: Drive, run: Run, points: 
     cols = np.broadcast_to(3 * k[:, None, None] + np.arange(3)[None, :, None], (len(p), 3, 3)).ravel()
     data = np.broadcast_to(link[..., 1:].reshape(-1, 1, 3), (len(p), 3, 3)).ravel()
     slope = sparse.csr_matrix((data, (rows, cols)), (9 * count, 3 * nodes))
-    carry = simulator.carry(points)
-    read = sparse.kron(carry, sparse.identity(3)).tocsr()
-    frames, share = states_of(run, drive, until)
-    answers = []
-    for frame in frames:
-        K = _stiffness(prepared, values, drive, run.u[frame].astype(float), _hold(drive, frame), slope, value)
-        try:
-            answers.append(cho_solve(cho_factor(K, overwrite_a=False), read.T.toarray(), overwrite_b=True).T)
-        except LinAlgError:
-            answers.append(lu_solve(lu_factor(K), read.T.toarray()).T)
-    return Tangent(prepared, values, drive, run, frames, share, np.stack(answers), slope, value)
+    return value, slope
 
 
 def states_of(run: Run, drive: Drive, until: int) -> tuple[np.ndarray, np.ndarray]:
@@ -168,7 +175,9 @@ def base_piola(prepared: Prepared, values: Values, F: np.ndarray) -> np.ndarray:
     return total
 
 
-def _stiffness(prepared, values, drive, u, hold, slope, value) -> np.ndarray:
+def stiffness(prepared: Prepared, values: Values, drive: Drive, u: np.ndarray, hold: np.ndarray, slope, value):
+    """Of elastic laws and anchors at nodal displacements u [m], (A, 3), that hold by these shares, (1 + J,) [N/m],
+    (3 A, 3 A); slope and value: `operators`."""
     F = np.eye(3) + (slope @ u.ravel()).reshape(-1, 3, 3)
     count = len(F)
     moduli = np.zeros((count, 9, 9))

@@ -106,6 +106,8 @@ def write(
         nuisances=nuisances(case),
         goodness=goodness(case, said_of.after),
         untold=list(case.base.untold),
+        forces={} if case.base.pulls is None else case.base.pulls.told(case.base.x),
+        as_given=[name for name in case.base.as_given if name in clip.recording.expected],
         base=base_numbers(case.base),
         noise=noise.told(),
         global_test={

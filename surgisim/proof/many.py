@@ -161,7 +161,7 @@ def main(arguments: Iterable[str] | None = None) -> int:
             from surgisim.diagnosis.files import carry_out
 
             settings = parse(Diagnosing, dict(map(_setting, told.one[2:])), "diagnose")
-            print(carry_out(Path(told.one[0]), Path(told.one[1]), settings))
+            print(carry_out([Path(told.one[0])], Path(told.one[1]), settings))
             return 0
         if told.list is None:
             cli.error("--list is wanted")

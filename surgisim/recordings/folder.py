@@ -1,4 +1,4 @@
-"""A recording as a folder: recording.json, rest.ply, fixed.json, tracks.npz; grip.npz, split.json if any.
+"""A recording as a folder: recording.json, rest.ply, fixed.json, tracks.npz; grip.npz, forces.npz, split.json if any.
 
 recording.json  format, name, fps, frames, length_unit (m, cm or mm; of every file), density_kg_m3 or null,
                 gravity_m_s2 [x, y, z] or null, tier; optional starts: "settled" (default) or "released";
@@ -13,6 +13,8 @@ tracks.npz      points (K, T, 3), NaN where unseen; visible (K, T); sigma (K,); 
                 axes (K, 3): noise along x, y and z over sigma, RMS 1, where it is not alike; or along the rows of
                 ways (K, 3, 3), orthonormal; doubts (C, K, T, 3): where points would go instead, less where they are
                 taken to go, were one of C things otherwise by a standard deviation (recording.json: doubts, its names)
+forces.npz      force (J, T, 3) of each grip on the tissue [N], NaN where it is not known, sigma (J,); optional held
+                (1, T, 3) and held_sigma (1,): of what is held (forces.py)
 split.json      {"fit": [0, t1], "held_out": [t1, T]}
 
 Keys that are not named here are passed over.
@@ -29,6 +31,7 @@ from surgisim.artifacts.motion import Motion
 from surgisim.problem import Problem
 from surgisim.recordings.arrays import arrays
 from surgisim.recordings.facts import boxes_of, facts, split_of, torn_of
+from surgisim.recordings.forces import encoded_forces, read_forces
 from surgisim.recordings.mesh import Mesh, closed
 from surgisim.recordings.ply import read_mesh, write_mesh
 from surgisim.recordings.recording import Recording, no_grips
@@ -90,6 +93,7 @@ def read_recording(folder: Path) -> Recording:
                 f"{folder / 'tracks.npz'}: the ways of point {askew[0]} are not of length 1 or not at right angles. "
                 "Give the rows of a rotation."
             )
+    motion = _motion(folder / "grip.npz", frames, unit)
     return Recording(
         name=told["name"],
         fps=told["fps"],
@@ -99,7 +103,8 @@ def read_recording(folder: Path) -> Recording:
         points=np.where(visible[..., None], points, np.nan).astype(np.float32),
         visible=visible,
         sigma=tracks["sigma"].astype(float) * unit,
-        motion=_motion(folder / "grip.npz", frames, unit),
+        motion=motion,
+        forces=read_forces(folder / "forces.npz", frames, len(motion.radius)),
         density=told["density"],
         gravity=told["gravity"],
         tier=told["tier"],
@@ -159,6 +164,8 @@ def encoded_recording(recording: Recording) -> dict[str, bytes]:
         "tracks.npz": _npz(tracks),
         "grip.npz": _npz(grips),
     }
+    if recording.forces is not None:
+        files["forces.npz"] = _npz(encoded_forces(recording.forces))
     if recording.split is not None:
         files["split.json"] = _json({name: list(span) for name, span in recording.split.items()})
     return files

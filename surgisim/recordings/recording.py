@@ -9,6 +9,7 @@ from surgisim.artifacts.base import check
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.motion import Motion
 from surgisim.recordings.fill import fill
+from surgisim.recordings.forces import Forces
 from surgisim.recordings.mesh import Mesh
 from surgisim.recordings.ways import told_of, turned
 
@@ -51,9 +52,12 @@ class Recording:
     astray: float = 0.0
     """Of how far a point has gone, how far its track is off [1]."""
     expected: dict[str, tuple[float, float]] = field(default_factory=dict)
-    """90 % intervals of what is known beforehand of the base's "E" [Pa] and "eta / E" [s], by their names."""
+    """90 % intervals of what is known beforehand of the base's "E" [Pa], "eta / E" [s], and of "nu" where another
+    recording's base told it, by their names."""
     split: dict[str, tuple[int, int]] | None = None
     """Frames `fit` and `held_out`, first and one past the last."""
+    forces: Forces | None = None
+    """Measured beside the points, where they were."""
     torn: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))
     """Walls through which the body does not hang together, as `Body.torn`, (K, 2, 2) [m]."""
 
@@ -69,6 +73,10 @@ class Recording:
             check(moved.shape == (k, t, 3), f"recording {self.name}: doubt '{name}' is {moved.shape}, not (K, T, 3).")
         grips = self.motion.active.shape[-1]
         check(grips == t, f"recording {self.name}: the grips have {grips} frames, the points {t}.")
+        check(
+            self.forces is None or self.forces.force.shape == (len(self.motion.active), t, 3),
+            f"recording {self.name}: forces must be of each of its {len(self.motion.active)} grips in {t} frames.",
+        )
         check(
             self.place is None or self.place.shape == (k, 3),
             f"recording {self.name}: 'place' must give a rest position for each of the {k} points.",

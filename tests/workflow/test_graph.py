@@ -203,6 +203,7 @@ CONCEALED |= {
 AGAIN = {
     "verification",
     "verification_case",
+    "known_base",
     "known_diagnosis",
     "known_report",
     "clip_diagnosis",

@@ -47,7 +47,7 @@ sys.exit()
 """A diagnosis of two runs that is killed between them when it is started first."""
 
 
-@pytest.mark.parametrize("folder", ["results/demo/main/diagnosis", "blind/5/0/main", "known/beam_load"])
+@pytest.mark.parametrize("folder", ["results/demo/main/diagnosis", "blind/5/0/main", "known/beam_damping"])
 def test_a_diagnosis_that_was_killed_keeps_its_runs_and_once_it_is_done_none(tree, folder):
     (tree.root / "config" / "clips.tsv").write_text("name\tpath\ndemo\tphantom\n")
     tree.choices = {"cases": 1, "seed": 5}

@@ -250,6 +250,25 @@ BESIDE = {"ablations": ["main", *ABLATIONS], "phases": ["main", *SHORTER]}
 
 # Real recordings with a known cause (known.smk).
 KNOWN = known_recordings()
+# Of each: what is diagnosed, what is held out, and what tells the base, as far as there is one.
+PARTS = ("recording", "hold_out", "bare")
+
+
+def known_hold_out(w):
+    """The files of the recording that a known one is held against, if it has one."""
+    held = KNOWN[w.known].hold_out is not None
+    return [f"known/{w.known}/hold_out/{name}" for name in FILES] if held else []
+
+
+def known_base(w):
+    """What another recording tells of a known one's base, if it has one."""
+    return f"known/{w.known}/base/physics.json" if KNOWN[w.known].bare else []
+
+
+def known_beside(w, input):
+    """Params function: the flags of a diagnosis for what stands beside a known recording."""
+    held = f"--hold-out {Path(input.hold_out[0]).parent}" if input.hold_out else ""
+    return f"{held} --base {input.base}" if input.base else held
 
 
 def inventing(w):

@@ -3,26 +3,27 @@
 
 wildcard_constraints:
     known="|".join(KNOWN),
+    part="|".join(PARTS),
 
 
 rule known:
     output:
-        recording="known/{known}/recording/recording.json",
-        rest="known/{known}/recording/rest.ply",
-        fixed="known/{known}/recording/fixed.json",
-        grip="known/{known}/recording/grip.npz",
-        tracks="known/{known}/recording/tracks.npz",
-        split="known/{known}/recording/split.json",
+        recording="known/{known}/{part}/recording.json",
+        rest="known/{known}/{part}/rest.ply",
+        fixed="known/{known}/{part}/fixed.json",
+        grip="known/{known}/{part}/grip.npz",
+        tracks="known/{known}/{part}/tracks.npz",
+        split="known/{known}/{part}/split.json",
     log:
-        "logs/known/{known}/known.log",
+        "logs/known/{known}/{part}.log",
     benchmark:
-        "benchmarks/known/{known}/known.tsv"
+        "benchmarks/known/{known}/{part}.tsv"
     conda:
         "../../envs/physics.yaml"
     resources:
         mem_mb=growing(2000),
     params:
-        settings=lambda w: json.dumps({"case": w.known}),
+        settings=lambda w: json.dumps({"case": w.known, "part": w.part}),
         code=code("known"),
     shell:
         'python "$SURGISIM/stages/known.py"'
@@ -31,9 +32,42 @@ rule known:
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
 
 
+rule known_base:
+    input:
+        recording=expand("known/{{known}}/bare/{name}", name=FILES),
+    output:
+        diagnosis="known/{known}/base/diagnosis.json",
+        physics="known/{known}/base/physics.json",
+        mismatch="known/{known}/base/mismatch.npz",
+        cloud="known/{known}/base/mismatch.ply",
+    log:
+        "logs/known/{known}/base.log",
+    benchmark:
+        "benchmarks/known/{known}/base.tsv"
+    conda:
+        "../../envs/physics.yaml"
+    threads: 2
+    resources:
+        mem_mb=growing(4000),
+        gpu=0,
+    params:
+        recording=folder,
+        settings=placed(diagnosing, "known_diagnosis"),
+        work=work,
+        code=code("diagnosis"),
+    shell:
+        'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
+        " --recording {params.recording} --diagnosis {output.diagnosis} --physics {output.physics}"
+        " --mismatch {output.mismatch} --cloud {output.cloud} --work {params.work}"
+        " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
+        " && rm -rf {params.work}"
+
+
 rule known_diagnosis:
     input:
         recording=expand("known/{{known}}/recording/{name}", name=FILES),
+        hold_out=known_hold_out,
+        base=known_base,
     output:
         diagnosis="known/{known}/diagnosis.json",
         physics="known/{known}/physics.json",
@@ -51,12 +85,14 @@ rule known_diagnosis:
         gpu=0,
     params:
         recording=folder,
+        beside=known_beside,
         settings=placed(diagnosing, "known_diagnosis"),
         work=work,
         code=code("diagnosis"),
     shell:
         'python "$SURGISIM/workflow/lease.py" {resources.gpu} python "$SURGISIM/stages/diagnosis.py"'
-        " --recording {params.recording} --diagnosis {output.diagnosis} --physics {output.physics}"
+        " --recording {params.recording} {params.beside}"
+        " --diagnosis {output.diagnosis} --physics {output.physics}"
         " --mismatch {output.mismatch} --cloud {output.cloud} --work {params.work}"
         " --settings {params.settings:q} --code {params.code} > {log} 2>&1"
         " && rm -rf {params.work}"

@@ -21,10 +21,16 @@ def convert(folder: Path):
     return carried(folder / "beam_load52_V2_a.c3d")
 
 
-def direct(folder: Path, progress) -> Found:
-    from surgisim.proof.rigs.swinging_beam import concealed_load
+def hold_out(folder: Path):
+    from surgisim.proof.rigs.clamped_beam import carried
 
-    return concealed_load(folder, progress)
+    return carried(folder / "beam_load52_V2_b.c3d", "take-b")
+
+
+def bare(folder: Path):
+    from surgisim.proof.rigs.clamped_beam import carried
+
+    return carried(folder / "beam_gravity_V2_a.c3d")
 
 
 def ask(folder: Path, found: Found) -> list[Answer]:
@@ -60,6 +66,9 @@ KNOWN = Known(
     data="silicone_beam_mocap",
     concealed="52 g hang on the free end. The base is the bare beam's, fitted on another take.",
     convert=convert,
-    direct=direct,
+    hold_out=hold_out,
+    bare=bare,
     ask=ask,
+    # Three cells across the beam.
+    settings={"grid": 0.23},
 )

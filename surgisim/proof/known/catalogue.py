@@ -68,12 +68,23 @@ class Known:
     """In words: what the base lacks, and how it is known."""
     convert: Callable[[Path], Any] | None = None
     """The `Recording` that is diagnosed, from the folder of the data."""
+    hold_out: Callable[[Path], Any] | None = None
+    """Another `Recording` of the same body, which is never fitted."""
+    bare: Callable[[Path], Any] | None = None
+    """The `Recording` whose diagnosis tells the base, if that is not fitted to the one that is diagnosed."""
     direct: Callable[[Path, Callable[..., None]], Found] | None = None
     """What is found, where the diagnosis of pulled tissue does not apply: from the folder of the data, and progress."""
     ask: Callable[[Path, Found], list[Answer]]
     """The questions, from the folder of the data and what was found."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """What the diagnosis is told beside its defaults."""
+
+    def part(self, name: str) -> Callable[[Path], Any]:
+        """What makes the recording, the one held out, or the bare one. Raises Problem where there is none."""
+        found = {"recording": self.convert, "hold_out": self.hold_out, "bare": self.bare}[name]
+        if found is None:
+            raise Problem(f"'{self.title}' has no {name.replace('_', ' ')}. Ask for another part.")
+        return found
 
 
 def catalogue() -> dict[str, Known]:

@@ -24,7 +24,7 @@ FITTED, WHOLE = 1.6, 2.4
 """Frames that are fitted, and all that are kept, after the release [s]."""
 
 
-def carried(path: Path) -> Recording:
+def carried(path: Path, name: str = "take") -> Recording:
     """The take with points of the beam's end in place of the markers around it."""
     seen = take(path)
     markers = seen.points.astype(float)
@@ -40,7 +40,7 @@ def carried(path: Path) -> Recording:
         turn, _ = Rotation.align_vectors(markers[:, t] - middle, markers[:, 0] - rest)
         points[:, t] = POINTS + turn.apply(own - rest) + middle - own
     return Recording(
-        name="take",
+        name=name,
         fps=seen.fps,
         mesh=seen.mesh,
         boxes=seen.boxes,

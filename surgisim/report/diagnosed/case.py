@@ -26,6 +26,8 @@ class Diagnosed:
     """physics.json as it stands."""
     experiment: dict[str, Any] = field(default_factory=dict)
     """"center" and "pull" [m] of the separating experiment, where the diagnosis gives them."""
+    elsewhere: dict[str, Any] = field(default_factory=dict)
+    """The base that another recording told, where there is one: file, numbers, passed_over."""
     header: dict[str, Any] = field(default_factory=dict)
     """Of diagnosis.json, where this project wrote it: settings and digest of the code."""
 
@@ -101,6 +103,7 @@ def read(recording: Path, diagnosis: Path, mismatch: Path, physics: Path) -> Dia
         left,
         json.loads(physics.read_text()),
         told.get("experiment") or _pull(verdict),
+        told.get("elsewhere") or {},
         told.get("header", {}),
     )
 

@@ -1,0 +1,165 @@
+"""Bodies that swing or hang: the engine answers, and the law that was left out is the one that foretells best."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import TRUE, block, recording
+
+from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis.clip import clip_of
+from surgisim.diagnosis.prior import START
+from surgisim.diagnosis.swinging import course, fit
+from surgisim.diagnosis.swinging import diagnose as made
+from surgisim.diagnosis.swinging.diagnose import diagnose_swinging
+from surgisim.diagnosis.swinging.period import LONG, loading, responses, slowest_period
+from surgisim.mpm.simulator import Breakdown
+from surgisim.problem import Problem
+from surgisim.recordings.mesh import Mesh
+from surgisim.recordings.recording import Recording, no_grips
+
+E, FRAMES, FIT = 2e4, 90, 60
+SWING, TURNS = 20, 0.01
+"""Frames of a swing, and how far it goes [m]."""
+
+
+def released(points: np.ndarray, fps: float, mesh: Mesh | None = None, name: str = "let go") -> Recording:
+    """A block, held below, that is let go while its weight lies along x; points [m], (K, T, 3)."""
+    mesh, frames = mesh or block(), points.shape[1]
+    low = mesh.vertices.min(0)
+    held = np.array([[low - 1.0, [1.0, 1.0, low[2] + 0.0025]]])
+    return Recording(
+        name=name, fps=fps, mesh=mesh, boxes=held, points=points.astype(np.float32),
+        visible=np.isfinite(points).all(-1), sigma=np.full(len(points), 1e-5), motion=no_grips(frames),
+        density=1050.0, gravity=(9.81, 0.0, 0.0), starts="released", place=points[:, 0].astype(float),
+        split={"fit": (0, FIT), "held_out": (FIT, frames)},
+    )  # fmt: skip
+
+
+def top(frames: int) -> np.ndarray:
+    side = np.stack(np.meshgrid(np.linspace(-0.015, 0.015, 4), np.linspace(-0.012, 0.012, 3)), -1).reshape(-1, 2)
+    return np.repeat(np.concatenate([side, np.full((12, 1), 0.012)], 1)[:, None], frames, 1)
+
+
+FPS = 100.0
+
+
+def swung(values, frames: int) -> np.ndarray:
+    """How the top goes along x [m], (frames,): its pitch by the modulus, its decay by viscosity, its rest by a mass."""
+    modulus = values["neo_hookean_ciarlet"]["E"]
+    decay = 2.0 * values.get("newtonian", {}).get("eta", 0.0) / 10.0
+    load = 1 + 20 * values.get("added_mass", {}).get("mass", 0.0)
+    # A mass in one place pulls with all its weight, and takes part in the swing with half of it.
+    t, turn = np.arange(frames) / FPS, 2 * np.pi * FPS / SWING * np.sqrt(modulus / E / (0.5 + 0.5 * load))
+    return TURNS * load * E / modulus * (1 - np.exp(-decay * t) * np.cos(turn * t))
+
+
+def take(values, seed: int, name: str = "take") -> Recording:
+    rng, points = np.random.default_rng(seed), top(FRAMES)
+    points = points + swung(values, FRAMES)[None, :, None] * np.array([1.0, 0, 0])
+    return replace(released(points + 1e-5 * rng.standard_normal(points.shape), FPS, name=name), place=top(1)[:, 0])
+
+
+@pytest.fixture
+def engine(monkeypatch):
+    """In place of the engine: the same motion from the laws' numbers; all but viscosity and a mass do nothing."""
+
+    def simulate(clip, values, places, frames, memo=None):
+        if values["neo_hookean_ciarlet"]["E"] < 4e3:
+            raise Breakdown("torn apart")
+        return np.repeat(swung(values, frames)[None, :, None] * np.array([1.0, 0, 0]), len(clip.kept), 0)
+
+    for room in (fit, made):
+        monkeypatch.setattr(room, "simulate", simulate)
+    monkeypatch.setattr(made, "slowest_period", lambda clip, x: SWING / FPS * np.sqrt(E / np.exp(x[0])))
+
+
+def found(recordings, held_out=None, **settings):
+    return diagnose_swinging(recordings, held_out, Diagnosing(grid=0.23, **settings), lambda *_: None)
+
+
+def base(**laws):
+    return {"neo_hookean_ciarlet": {"E": E, "nu": 0.45}, **laws}
+
+
+def test_a_cantilevers_slowest_period_is_that_of_its_closed_form():
+    mesh = block()
+    length, width = 0.08, 0.012
+    corner = (mesh.vertices - mesh.vertices.min(0)) / np.ptp(mesh.vertices, axis=0) * [width, width, length + 0.0025]
+    points = np.repeat(np.array([[[0.006, 0.006, z]] for z in (0.02, 0.04, 0.06, 0.08)]), FRAMES, 1)
+    clip = clip_of(released(points, 100.0, Mesh(corner, mesh.faces)), share=0.14)
+    x = START.copy()
+    x[0] = np.log(5e4)
+    frequency = 1.8751**2 / (2 * np.pi) * np.sqrt(5e4 * width**2 / 12 / 1050.0 / length**4)
+    assert slowest_period(clip, x) == pytest.approx(1 / frequency, rel=0.08)
+    # A stiffer one is quicker by the root.
+    x[0] += np.log(4.0)
+    assert slowest_period(clip, x) == pytest.approx(0.5 / frequency, rel=0.08)
+
+
+def test_weight_sets_in_at_once_and_a_pull_as_fast_as_it_goes():
+    clip = clip_of(released(top(FRAMES), 100.0), share=0.23)
+    assert loading(clip) == pytest.approx(0.01)
+    assert responses(clip, START).by_engine
+    pulled = clip_of(recording(), share=0.23)
+    assert 0.3 < loading(pulled) < 0.8
+    told = responses(pulled, TRUE)
+    assert told.ratio < LONG
+    assert told.told()["used"] == "tangent"
+    assert loading(clip_of(replace(pulled.recording, motion=no_grips(32)), share=0.23)) == np.inf
+
+
+def test_a_body_that_never_rests_is_told_what_brings_it_to_rest(engine):
+    true = base(newtonian={"eta": 3.0})
+    verdict, physics, mismatch = found([take(true, 1)], take(true, 2, "other"), base="elastic")
+    assert [e["term"] for e in verdict.effects] == ["newtonian"]
+    assert physics.terms["newtonian"]["eta"]["value"] == pytest.approx(3.0, rel=0.02)
+    assert physics.terms["neo_hookean_ciarlet"]["E"]["value"] == pytest.approx(E, rel=0.01)
+    assert verdict.held_out["after"] < 0.05 * verdict.held_out["before"]
+    assert "recording other, which was never fitted" in verdict.words
+    assert verdict.global_test["responses"]["used"] == "engine"
+    assert mismatch.residual_before.shape == (len(mismatch.points), FRAMES, 3)
+
+
+def test_with_a_viscous_base_the_same_body_lacks_nothing(engine):
+    true = base(newtonian={"eta": 3.0})
+    verdict, _, _ = found([take(true, 1)], take(true, 2))
+    assert verdict.base["eta"]["value"] == pytest.approx(3.0, rel=0.02)
+    assert verdict.base["E"]["low"] <= E * 1.01
+    assert verdict.held_out["before"] < 0.05
+    assert "newtonian" not in [e["term"] for e in verdict.effects]
+
+
+def test_a_load_beside_a_base_that_another_recording_told_is_found_with_its_mass(engine):
+    true = base(newtonian={"eta": 3.0}, added_mass={"mass": 0.03})
+    told = {"E": (0.9 * E, 1.1 * E), "eta / E": (1.2e-4, 1.8e-4)}
+    verdict, physics, _ = found([replace(take(true, 1), expected=told)], take(true, 2))
+    assert verdict.effects[0]["term"] == "added_mass"
+    assert physics.terms["added_mass"]["mass"]["value"] == pytest.approx(0.03, rel=0.1)
+
+
+def test_two_recordings_are_fitted_together_and_a_third_is_foretold(engine):
+    true = base(newtonian={"eta": 3.0})
+    verdict, _, _ = found([take(true, 1), take(true, 2)], take(true, 3, "third"), base="elastic")
+    assert verdict.effects[0]["term"] == "newtonian"
+    assert "third" in verdict.words
+    with pytest.raises(Problem, match="Say which one with --hold-out"):
+        found([take(true, 1), take(true, 2)], base="elastic")
+
+
+def test_recordings_of_different_bodies_are_refused(engine):
+    mine, other = take(base(), 1), take(base(), 2, "other")
+    wide = replace(other, boxes=other.boxes + 1e-3)
+    with pytest.raises(Problem, match=r"their fixed\.json differ"):
+        found([mine], wide)
+
+
+def test_of_what_hangs_at_rest_every_second_point_is_held_out():
+    points = top(FRAMES)
+    points[:, 1 : FIT - 1] = np.nan
+    clip = clip_of(replace(released(points, 100.0), place=top(1)[:, 0]), share=0.23)
+    assert course.comes_to_rest(clip)
+    half, rest = course.every_second(course.fitted(clip, 0.2))
+    assert half.seen.sum() == rest.seen.sum() == 6 * 2
+    assert not (half.seen & rest.seen).any()
+    assert not course.comes_to_rest(clip_of(released(top(FRAMES), 100.0), share=0.23))
