@@ -7,9 +7,9 @@ from surgisim.artifacts.verdict import Verdict
 def unnamed(kind: str, truth: Truly | None, verdict: Verdict, oracle: dict | None) -> dict | None:
     """Of a case whose effect is outside the catalogue and which has a law without a name; None otherwise.
 
-    truth: how what is concealed behaves; oracle: what `held_out` says of the case. asked: question -> whether its answer
-    is right; character: whether all are; modelled: whether physics.json has it; share: what it cuts of what the oracle
-    would, and rises: whether the error with it is larger than without, where it is modelled: else nothing is cut.
+    truth: how what is concealed behaves; oracle: what `held_out` says of the case. asked: question -> whether its
+    answer is right; character: whether all are; modelled: whether physics.json has it; share: what it cuts of what the
+    oracle would, and rises: whether the error with it is larger than without, where it is modelled: else nothing is cut.
     """
     found = verdict.residual
     if kind != "outside" or found is None or not found.laws:
