@@ -9,7 +9,8 @@ def unnamed(kind: str, truth: Truly | None, verdict: Verdict, oracle: dict | Non
 
     truth: how what is concealed behaves; oracle: what `held_out` says of the case. asked: question -> whether its
     answer is right; character: whether all are; modelled: whether physics.json has it; share: what it cuts of what the
-    oracle would, and rises: whether the error with it is larger than without, where it is modelled: else nothing is cut.
+    oracle would, and rises: whether the error with it is larger than without, where it is modelled, as nothing is cut
+    else.
     """
     found = verdict.residual
     if kind != "outside" or found is None or not found.laws:
