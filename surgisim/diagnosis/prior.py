@@ -31,15 +31,17 @@ USUAL = Prior(START, SPREAD)
 """Of tissue of which nothing is known."""
 
 
-def prior_of(recording: Recording) -> Prior:
+def prior_of(recording: Recording, surest: float = SUREST) -> Prior:
     """Usual tissue's, narrowed to what the recording says is known of its base; never wider than that.
+
+    surest: least spread of a logarithm.
 
     Of a video an estimation knows it by the same tracks, which count twice then: intervals of the base may be too
     narrow by that, and their coverage has not been measured.
     """
     middle, spread = USUAL.middle.copy(), USUAL.spread.copy()
     for name, (low, high) in recording.expected.items():
-        k, least = PLACES[name], SUREST_RATIO if name == "nu" else SUREST
+        k, least = PLACES[name], SUREST_RATIO if name == "nu" else surest
         low, high = (low, high) if name == "nu" else (np.log(low), np.log(high))
         middle[k] = 0.5 * (low + high)
         spread[k] = np.clip((high - low) / (2 * NINETY), least, SPREAD[k])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from surgisim.problem import Problem
-from surgisim.recordings.forces import Forces, read_forces
+from surgisim.recordings.forces import Forces, encoded_forces, read_forces
 
 FRAMES = 6
 
@@ -53,3 +53,11 @@ def test_forces_are_of_what_is_held_and_then_of_the_grips(tmp_path):
 def test_forces_of_other_shapes_are_no_forces():
     with pytest.raises(Problem, match="are wanted"):
         Forces(np.zeros((2, FRAMES, 3)), np.ones(1))
+
+
+def test_what_is_written_is_read_again(tmp_path):
+    made = Forces(told()["force"], told()["sigma"], np.full((1, FRAMES, 3), 0.2), np.array([0.03]))
+    np.savez(tmp_path / "forces.npz", **encoded_forces(made))
+    again = read_forces(tmp_path / "forces.npz", FRAMES, 2)
+    for name, value in vars(made).items():
+        np.testing.assert_array_equal(getattr(again, name), value)

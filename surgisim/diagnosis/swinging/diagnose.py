@@ -33,6 +33,9 @@ from surgisim.recordings.recording import Recording
 
 CLOSE = 1.10
 """Times the best law's error in what is held out below which another law does as well; chosen."""
+SUREST = 0.03
+"""Least spread of a logarithm that another recording of the same body, form and all, told; chosen: five per cent either
+way at 90 %, as much as two grids of a beam differ."""
 PAYS = 1.0
 """Times the base's error there below which a law must stay to be named."""
 Progress = Callable[[float, float, str], None]
@@ -57,7 +60,7 @@ def diagnose_swinging(
     first = clips[0]
     if not first.body.held.any():
         raise Problem(f"recording {first.recording.name}: nothing holds the body. Say in fixed.json what does.")
-    prior = prior_of(first.recording)
+    prior = prior_of(first.recording, SUREST)
     given = prior if first.recording.expected else None
     elastic, settles = settings.base == "elastic", all(courses.comes_to_rest(c) for c in clips)
     rough = tuple(courses.fitted(c, np.inf if settles else _liveliest_period(c)) for c in clips)
