@@ -19,13 +19,13 @@ EDGE = 0.05
 """How fast it ends, and how gradually it begins to fade [s]."""
 STEEP = 3.75
 """With it S is as steep in the middle as the smoothest polynomial of degree five that rises within one [1]."""
-NEVER = 59.0
-"""An end, and a time of fading, after every clip [s]."""
+NEVER, LASTING = 59.0, 1e6
+"""An end after every clip, and a time of fading so long that none does [s]."""
 PARAMS = {
     "onset": Param("s", low=-1e2, high=6e1, default=0.2, logarithmic=False),
     "rise": Param("s", low=0.05, high=2e1, default=0.2),
     "end": Param("s", low=0.0, high=6e1, default=NEVER, logarithmic=False),
-    "fade": Param("s", low=0.05, high=6e1, default=NEVER),
+    "fade": Param("s", low=0.05, high=LASTING, default=LASTING),
     "rhythm": Param("1", low=0.0, high=1.0, default=0.0, logarithmic=False),
     "period": Param("s", low=0.2, high=6e1, default=2.0),
     "phase": Param("rad", low=-np.pi, high=np.pi, default=0.0, logarithmic=False),

@@ -46,7 +46,7 @@ def _at_rest(case, course: np.ndarray) -> bool | None:
 def _change(h: Hypothesis) -> str:
     if "tau" in h.about:
         return "fades"
-    if "rhythm" in h.about and (h.end is not None or h.about["fade"] < courses.NEVER):
+    if "rhythm" in h.about and (h.end is not None or h.about["fade"] < courses.LASTING):
         return "fades"
     return "grows" if h.onset is not None and h.about["rise"] > SLOW else "holds"
 

@@ -13,7 +13,7 @@ from surgisim.diagnosis import knobs
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import hats, knots
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.physics.course import NEVER, at
+from surgisim.physics.course import LASTING, NEVER, at
 
 KNOT = 0.2
 """Time between the knots of the courses in a coarse search [s]; around its best, courses are followed exactly."""
@@ -34,7 +34,7 @@ class Course:
     onset: float
     rise: float = RISES[0]
     end: float | None = None
-    fade: float = NEVER
+    fade: float = LASTING
     rhythm: float = 0.0
     period: float = 2.0
     phase: float = 0.0
@@ -105,7 +105,7 @@ def near(course: Course, step: float) -> Iterator[Course]:
         for scale in scales:
             onset = max(course.onset + float(shift), 0.0)
             yield replace(course, onset=onset, rise=max(course.rise * float(scale), 0.08))
-            if course.fade < NEVER:
+            if course.fade < LASTING:
                 yield replace(course, onset=onset, fade=course.fade * float(scale))
             if course.end is not None:
                 yield replace(course, onset=onset, end=course.end + 2 * float(shift))
@@ -116,7 +116,7 @@ def free(h: Hypothesis) -> list[knobs.Knob]:
     course = of(h)
     if course.rhythm > 0:
         return [knobs.logarithm("period", 0.15), knobs.plus("phase", 0.5)]
-    fades = [knobs.logarithm("fade", 0.7, NEVER)] if course.fade < NEVER else []
+    fades = [knobs.logarithm("fade", 0.7)] if course.fade < LASTING else []
     return [*knobs.moment(h, "onset", "end"), knobs.logarithm("rise", 0.5), *fades]
 
 
