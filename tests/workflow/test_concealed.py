@@ -98,7 +98,23 @@ def test_a_clip_that_conceals_goes_through_the_graph_and_only_its_score_opens_th
 
 def test_a_tier_that_nobody_knows_is_one_sentence(tree):
     tree.choices = {"cases": 1, "seed": 5, "tier": "film"}
-    assert "config key 'tier' is 'film'; ['tracks', 'video'] are known." in tree.says("--dry-run", "blind")
+    assert "config key 'tier' is 'film'; ['tracks', 'video', 'tetrahedra', 'springs', 'lattice'] are known." in tree.says("--dry-run", "blind")
+
+
+def test_a_family_invents_in_a_folder_of_its_own_and_its_name_goes_to_whoever_invents_alone(jobs):
+    planned = jobs("blind", "tier=springs")
+    rules = [rule for rule, *_ in planned]
+    assert (rules.count("invent"), rules.count("diagnosis"), rules.count("score")) == (3, 3, 3)
+    (seals,) = [inputs for rule, inputs, _ in planned if rule == "seals"]
+    assert sorted(seals) == [f"blind/springs-5/{case}/seal.txt" for case in range(3)]
+    for rule, inputs, _ in planned:
+        assert rule in ("invent", "score") or not [path for path in inputs if "/sealed/" in path]
+
+
+def test_one_generator_left_out_takes_every_family_s_board(jobs):
+    (across,) = [inputs for rule, inputs, _ in jobs("blind_across") if rule == "across"]
+    families = ("", "tetrahedra-", "springs-", "lattice-")
+    assert across == [f"blind/{family}5/main/scoreboard.json" for family in families]
 
 
 def test_shuffled_paths_are_another_cases(jobs):
