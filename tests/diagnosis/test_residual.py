@@ -49,6 +49,7 @@ def best_of(case, z, taken):
     return laws, max(laws.values(), key=lambda score: score.evidence).best.hypothesis
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["residual_force", "residual_stress"])
 def test_what_is_planted_on_the_tangent_is_found_with_its_place_and_its_course(form):
     case, course = plain(), Course(0.85, rise=0.6)
@@ -65,6 +66,7 @@ def test_what_is_planted_on_the_tangent_is_found_with_its_place_and_its_course(f
     assert pays(laws, case)
 
 
+@pytest.mark.slow
 def test_where_nothing_is_no_form_pays():
     case = plain()
     for null in case.nulls.T[:2]:

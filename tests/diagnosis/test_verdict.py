@@ -17,7 +17,7 @@ from surgisim.diagnosis.nuisance import FINER
 from surgisim.diagnosis.prospect import SHOWS, Gain
 from surgisim.physics.place import Place
 
-SETTINGS = Diagnosing(grid=GRID, replay=GRID, nulls=8, experiment=False, free=0)
+SETTINGS = Diagnosing(grid=GRID, replay=GRID, nulls=8, experiment=False, free=0, residual=False)
 WORSE = Gain(-50.0, -80.0, -20.0, 60.0)
 
 
