@@ -399,3 +399,20 @@ def receipt():
         },
         "seeds": AGAIN,
     }
+
+
+# Cases of the seed that are shown: the first ones, whatever they are.
+SHOWN_CASES = range(min(COUNT, 6))
+
+
+def shown_cases(pattern):
+    """The file of every concealed case that is shown."""
+    return [pattern.format(seed=room(SEED), case=case) for case in SHOWN_CASES]
+
+
+def shown_clips(stage, name):
+    """Where `stage` left `name` of every clip."""
+    return [
+        f"results/{clip}/{PLAN.homes[stage, clip, 'main']}/{stage}/{name}"
+        for clip in PLAN.clips
+    ]

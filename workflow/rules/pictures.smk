@@ -3,21 +3,6 @@
 # Pictures of all runs together take two thirds of the gallery's page; written as text, a byte takes four thirds.
 MOST_BYTES = 8_000_000
 SHARE = MOST_BYTES // (2 * len(PLAN.clips))
-# Cases of the seed that are shown: the first ones, whatever they are.
-SHOWN_CASES = range(min(COUNT, 6))
-
-
-def shown_cases(pattern):
-    """The file of every concealed case that is shown."""
-    return [pattern.format(seed=room(SEED), case=case) for case in SHOWN_CASES]
-
-
-def shown_clips(stage, name):
-    """Where `stage` left `name` of every clip."""
-    return [
-        f"results/{clip}/{PLAN.homes[stage, clip, 'main']}/{stage}/{name}"
-        for clip in PLAN.clips
-    ]
 
 
 rule clip_pictures:
@@ -139,6 +124,8 @@ rule kept_pictures:
         "logs/{clip}/main/kept_pictures.log",
     benchmark:
         "benchmarks/{clip}/main/kept_pictures.tsv"
+    conda:
+        "../../envs/report.yaml"
     resources:
         mem_mb=growing(500),
     shell:
