@@ -98,7 +98,10 @@ def test_a_clip_that_conceals_goes_through_the_graph_and_only_its_score_opens_th
 
 def test_a_tier_that_nobody_knows_is_one_sentence(tree):
     tree.choices = {"cases": 1, "seed": 5, "tier": "film"}
-    assert "config key 'tier' is 'film'; ['tracks', 'video', 'tetrahedra', 'springs', 'lattice'] are known." in tree.says("--dry-run", "blind")
+    assert (
+        "config key 'tier' is 'film'; ['tracks', 'video', 'tetrahedra', 'springs', 'lattice'] are known."
+        in tree.says("--dry-run", "blind")
+    )
 
 
 def test_a_family_invents_in_a_folder_of_its_own_and_its_name_goes_to_whoever_invents_alone(jobs):
