@@ -22,9 +22,10 @@ from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.memo import NOTHING_KEPT, Memo
 from surgisim.diagnosis.prior import prior_of
 from surgisim.diagnosis.swinging import course as courses
+from surgisim.diagnosis.swinging.candidates import laws
 from surgisim.diagnosis.swinging.course import Course, simulate
 from surgisim.diagnosis.swinging.fit import Body, Tried, fit_base, try_base, try_law, units
-from surgisim.diagnosis.swinging.laws import frame_of, laws
+from surgisim.diagnosis.swinging.law import frame_of
 from surgisim.diagnosis.swinging.period import Responses, responses, slowest_period
 from surgisim.estimation.identify import NINETY
 from surgisim.physics.catalogue import choose

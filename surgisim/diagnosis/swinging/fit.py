@@ -12,7 +12,7 @@ from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import NOTHING_KEPT, Memo
 from surgisim.diagnosis.prior import SPREAD, USUAL, Prior
 from surgisim.diagnosis.swinging.course import Course, simulate, turned
-from surgisim.diagnosis.swinging.laws import Frame, Law
+from surgisim.diagnosis.swinging.law import Frame, Law
 from surgisim.estimation.identify import NINETY
 from surgisim.mpm.setup import Values
 from surgisim.mpm.simulator import Breakdown
