@@ -24,9 +24,9 @@ from surgisim.proof.shares import wilson
 
 FORMAT = "surgisim-across/1"
 ALARMS = 0.05
-"""Most of the empty cases that may be called anything but empty."""
+"""Most of the empty cases that may be called anything but empty; chosen, as the goal for them is."""
 WRONG = 0.10
-"""Most of the names that may be wrong."""
+"""Most of the names that may be wrong; chosen."""
 HEATS = np.geomspace(0.5, 20.0, 60)
 TINY = 1e-9
 """Least probability that a truth is taken to have had."""

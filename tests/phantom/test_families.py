@@ -11,13 +11,14 @@ from surgisim.config.invent import FAMILIES, Invent
 from surgisim.phantom.families import bodies, stepping
 from surgisim.phantom.families import seen as seeing_of
 from surgisim.phantom.families.blind import concealed, invent, recording
-from surgisim.phantom.families.hidden import KINDS
+from surgisim.phantom.families.hidden import KINDS, described
 from surgisim.phantom.families.oracle import evidence
 from surgisim.phantom.families.solvers import solver
 from surgisim.phantom.families.solvers.lattice import Lattice
 from surgisim.phantom.families.solvers.springs import Springs
 from surgisim.phantom.families.solvers.tetrahedra import Tetrahedra, shapes
 from surgisim.phantom.families.world import Grip, Material, World, draw
+from surgisim.proof.numbers import COMPARED
 from surgisim.recordings.folder import read_recording
 
 MODELS = {"tetrahedra": Tetrahedra, "springs": Springs, "lattice": Lattice}
@@ -179,6 +180,18 @@ def test_everything_that_can_be_hidden_moves_the_body_and_nothing_at_magnitude_z
         share = 0.9 if effect in ("damage", "plastic_set") else 0.2
         moved = engine.paths(world, (hidden.scaled(share * KINDS[effect].most),))
         assert np.abs(moved - plain).max() > 4e-7, effect
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_numbers_that_a_diagnosis_is_held_against_are_all_there_or_the_solver_s_own(name):
+    world, rng = world_with_grip(), np.random.default_rng(5)
+    base = {"E": 4e3, "nu": 0.45, "eta": 20.0}
+    for effect in set(solver(name).CONCEALS) & COMPARED.keys():
+        hidden = KINDS[effect].draw(world, rng, effect).scaled(KINDS[effect].start)
+        told = described(world, hidden, effect in solver(name).OWN)["parameters"]
+        numbers = {key: entry["value"] for key, entry in told.items()}
+        if not any(key.startswith("own ") for key in numbers):
+            assert all(make(numbers, base) >= 0 for make in COMPARED[effect].values())
 
 
 def test_steps_half_as_long_change_little(monkeypatch):

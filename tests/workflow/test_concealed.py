@@ -198,6 +198,7 @@ def test_three_real_cases_go_from_their_seal_to_a_score(tmp_path):
             "grid": 0.23,
             "replay": 0.23,
             "experiment": False,
+            "residual": False,
         },
     }
     assert tree.run("--set-threads", "diagnosis=1", "--keep-going", "blind") == 0
