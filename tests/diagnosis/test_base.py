@@ -132,6 +132,7 @@ def test_a_base_is_fitted_anew_where_a_run_fits_worse_than_promised(monkeypatch)
     assert runs() == 3
 
 
+@pytest.mark.slow(75)
 def test_a_body_is_found_within_what_is_said_of_it():
     case = plain()
     assert (np.abs(case.base.x - TRUE) < 2.5 * case.base.spread).all()

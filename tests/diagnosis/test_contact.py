@@ -64,6 +64,7 @@ def test_what_draws_tissue_outward_is_not_called_a_contact():
     assert "draws the tissue out of its surface at 1" in drawn.words
 
 
+@pytest.mark.slow(65)
 def test_a_push_that_stays_comes_out_with_the_sign_it_has():
     # Constants projected out, it is nearly the opposite push up to its onset.
     force = np.array([0.02, 0.03, -0.1])

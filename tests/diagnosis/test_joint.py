@@ -30,6 +30,7 @@ def found(case, h: Hypothesis, amplitude: np.ndarray) -> Refit:
     return Refit(finding, amplitude, response, 100.0, 50.0)
 
 
+@pytest.mark.slow(90)
 def test_laws_that_are_fitted_together_do_not_make_up_for_each_other(case):
     off = np.array([np.sin(TURN), np.cos(TURN), 0.0])
     weight = found(case, Hypothesis("gravity", np.eye(3), 0, None, 0.0), 0.6 * WEIGHT)
@@ -49,6 +50,7 @@ def test_laws_that_are_fitted_together_do_not_make_up_for_each_other(case):
     assert any("gravity and fibre" in text for text in said)
 
 
+@pytest.mark.slow(5)
 def test_a_law_that_came_out_as_nothing_is_dropped_and_one_that_says_something_is_not(case, monkeypatch):
     weight = found(case, Hypothesis("gravity", np.eye(3), 0, None, 0.0), WEIGHT)
     strand = found(

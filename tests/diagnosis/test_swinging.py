@@ -12,6 +12,7 @@ from surgisim.diagnosis.prior import START
 from surgisim.diagnosis.swinging import course, fit
 from surgisim.diagnosis.swinging import diagnose as made
 from surgisim.diagnosis.swinging.diagnose import diagnose_swinging
+from surgisim.diagnosis.swinging.fit import Tried
 from surgisim.diagnosis.swinging.period import LONG, loading, responses, slowest_period
 from surgisim.mpm.simulator import Breakdown
 from surgisim.problem import Problem
@@ -106,6 +107,11 @@ def test_weight_sets_in_at_once_and_a_pull_as_fast_as_it_goes():
     told = responses(pulled, TRUE)
     assert told.ratio < LONG
     assert told.told()["used"] == "tangent"
+    # As soft as this it is still swinging when the pull has arrived; what grips it, the tangent weighs all laws of.
+    soft = TRUE - np.log(400.0) * np.eye(3)[0]
+    told = responses(pulled, soft)
+    assert told.ratio > LONG
+    assert told.told()["used"] == "tangent"
     assert loading(clip_of(replace(pulled.recording, motion=no_grips(32)), share=0.23)) == np.inf
 
 
@@ -127,7 +133,25 @@ def test_with_a_viscous_base_the_same_body_lacks_nothing(engine):
     assert verdict.base["eta"]["value"] == pytest.approx(3.0, rel=0.02)
     assert verdict.base["E"]["low"] <= E * 1.01
     assert verdict.held_out["before"] < 0.05
-    assert "newtonian" not in [e["term"] for e in verdict.effects]
+    assert verdict.verdict == "nothing detectable"
+
+
+@pytest.mark.parametrize(("better", "said"), [(0.0, False), (0.1, True)])
+def test_a_law_must_foretell_better_than_one_of_many_would_by_accident(engine, better, said):
+    noise = np.random.default_rng(4).standard_normal((3, 12, FRAMES, 3))
+    clip = clip_of(released(top(FRAMES) + 1e-4 * noise[0], FPS), share=0.23)
+    held = replace(course.kept_out(clip), period=0.02)
+    moved = {"base": 1e-5 * noise[1], "law": 1e-5 * noise[2] + better * clip.moved}
+
+    class Runs:
+        def moved(self, course, values, places):
+            return moved[values]
+
+    base, law = (Tried(None, START, np.zeros(0), n, {}, 0.0, 0.0, np.zeros(0)) for n in ("base", "law"))
+    assert made.surely_better(Runs(), base, law, held, 9) == said
+    assert made.surely_better(Runs(), base, law, replace(held, period=np.inf), 9) == said
+    # Of itself nobody can be better.
+    assert not made.surely_better(Runs(), base, base, held, 9)
 
 
 def test_a_load_beside_a_base_that_another_recording_told_is_found_with_its_mass(engine):

@@ -123,6 +123,7 @@ def test_a_place_for_a_law_that_the_body_lacks_is_refused():
         estimate(*clip(), settings, silent)
 
 
+@pytest.mark.slow(35)
 def test_a_path_that_would_turn_the_tissue_inside_out_lets_it_slip_and_says_so():
     case = list(clip())
     wild = pulled(frames=T, hold=9, by=(0.0, 0.0, 0.03))
@@ -142,6 +143,7 @@ def test_rounds_double_so_that_their_sum_stays_below_twice_the_clip():
         assert ends[0] >= 14
 
 
+@pytest.mark.slow(35)
 def test_how_deep_the_body_is_held_is_found_from_the_spread_of_the_pull():
     _, _, fit, _, laid, doubts = estimate(*clip(deep=0.009), Estimation(**QUICK), silent)
     depth = fit.identifiability["held.depth"]
@@ -155,6 +157,7 @@ def test_how_deep_the_body_is_held_is_found_from_the_spread_of_the_pull():
     assert not {"corotated.E", "grip 0.release"} & set(doubts.names)
 
 
+@pytest.mark.slow(45)
 def test_how_far_the_grip_comes_nearer_is_found_where_depth_is_not_measured():
     case = list(clip(noise=2e-5))
     tracks, motion = case[2], case[3]

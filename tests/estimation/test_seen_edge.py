@@ -85,12 +85,14 @@ def fitted(moved: np.ndarray | None, settings: Estimation):
     return estimate(*case, settings, silent)
 
 
+@pytest.mark.slow(40)
 def test_a_still_surrounding_is_left_alone(quick):
     found = fitted(None, quick)
     assert found.fit.held_out["support"]["patches"] == 0
     assert not len(found.motion.rim)
 
 
+@pytest.mark.slow(70)
 def test_a_surrounding_that_goes_away_carries_the_edge(quick):
     found = fitted(np.linspace(0, 1, T)[:, None] * AWAY, quick)
     patches = found.fit.held_out["support"]["patches"]

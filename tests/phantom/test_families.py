@@ -248,11 +248,16 @@ def test_twenty_cases_hold_the_whole_mixture_and_every_law_comes_before_one_come
     assert len(set(inside[:12])) == 12
 
 
-@pytest.mark.slow(60)
+SHORT = {"tetrahedra": 42, "springs": 14, "lattice": 36}
+"""Seeds whose first empty case is a small body and a short recording."""
+
+
+@pytest.mark.slow(30)
 @pytest.mark.parametrize("family", MODELS)
 def test_a_case_is_a_recording_that_can_be_read_and_the_same_every_time(family, tmp_path):
-    case = next(c for c in range(20) if concealed(Invent(family=family, seed=11, case=c), solver(family)) is None)
-    settings = Invent(family=family, seed=11, case=case)
+    seed = SHORT[family]
+    case = next(c for c in range(20) if concealed(Invent(family=family, seed=seed, case=c), solver(family)) is None)
+    settings = Invent(family=family, seed=seed, case=case)
     made = invent(settings)
     assert made == invent(settings)
     for name, content in made.recording.items():

@@ -232,8 +232,6 @@ def test_every_page_fits_a_narrow_window_and_a_wide_one(made, content, tmp_path)
     how = how_made({"masking": {"margin": 0.125}})
     both = [told.metrics, dataclasses.replace(told.metrics, variant="elastic")]
     board = json.loads((boards / "blind" / "23112614" / "scoreboard.json").read_text())
-    # Scored before this figure was there.
-    board["figures"].setdefault("weaker", None)
     pages = {
         "report": content,
         "summary": summary(both, [thumbnail(told)] * 2, how),

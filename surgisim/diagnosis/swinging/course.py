@@ -55,6 +55,11 @@ class Course:
         n = self.until
         return (self.clip.moved[:, :n] - moved[:, :n])[self.seen[:, :n]]
 
+    def squares(self, moved: np.ndarray) -> np.ndarray:
+        """Squared distance of what is seen [m^2], (K, until); nothing where it is not."""
+        n = self.until
+        return np.where(self.seen[:, :n], ((self.clip.moved[:, :n] - moved[:, :n]) ** 2).sum(-1), 0.0)
+
     def weighted(self, moved: np.ndarray) -> np.ndarray:
         """The same times the frames' weights, less what each point may creep, (M, 3)."""
         n, seen = self.until, self.seen[:, : self.until]

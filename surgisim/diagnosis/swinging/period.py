@@ -3,7 +3,9 @@
     K w = (2 pi / T)^2 M w,   K the tangent stiffness of what is held at rest, M the nodes' masses
 
 A load that rises steadily over a time t leaves a body swinging by T / (pi t) of its response at most. Where that is
-small the tangent stiffness answers for tissue; where it is not, the engine must.
+small the tangent stiffness answers for tissue; where it is not, and nothing grips the body, the engine must. Of a body
+that is gripped the engine runs the base, the release and the best laws in any case, and the tangent only orders them:
+there it is kept, since it weighs every law of the catalogue against noise and nuisances.
 """
 
 from dataclasses import dataclass
@@ -27,6 +29,8 @@ class Responses:
     """Slowest of the base held where it is held [s]."""
     loading: float
     """Shortest time in which what drives the body changes in the fitted frames [s]; infinite where nothing does."""
+    gripped: bool
+    """Whether anything grips it in the fitted frames."""
 
     @property
     def ratio(self) -> float:
@@ -34,7 +38,7 @@ class Responses:
 
     @property
     def by_engine(self) -> bool:
-        return self.ratio > LONG
+        return self.ratio > LONG and not self.gripped
 
     def told(self) -> dict:
         """As diagnosis.json has it."""
@@ -45,7 +49,7 @@ class Responses:
 
 def responses(clip: Clip, x: np.ndarray) -> Responses:
     """With a base's numbers, (3,)."""
-    return Responses(slowest_period(clip, x), loading(clip))
+    return Responses(slowest_period(clip, x), loading(clip), bool(clip.held[: clip.until].any()))
 
 
 def loading(clip: Clip) -> float:
