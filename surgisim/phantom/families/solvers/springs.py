@@ -1,10 +1,12 @@
 """Points joined by springs, and small tetrahedra that keep their volume: not a continuum, and so a little wrong.
 
-    f = k (L - L0) along each spring,  k = E / L0^2 times the volume around it                        [N]
+    f = k (L - L0) along each spring                                                                  [N]
     p = b (V / V0 - 1) in each tetrahedron                                                          [Pa]
 
-Springs of all directions alike make a solid with Young's modulus E and Poisson's ratio 1/4 (Cauchy); the volumes raise
-the latter. What is hidden in the tissue is written for springs: they stiffen with the square of their strain, creep,
+A point is joined to those about it, and the springs' constants k >= 0 are those by which its surroundings come nearest
+to a solid that is alike in all directions: sum k L0^2 (n n n n) = mu V (dd + dd + dd), n their directions (Cauchy's
+relation: lambda = mu). Edges of a mesh alone have shear moduli that differ threefold between directions; these differ
+by some per cent, in a tube by up to a third. The volumes raise Poisson's ratio. What is hidden in the tissue is written for springs: they stiffen with the square of their strain, creep,
 take a set, tear in part, shorten, and are more along some direction than along others.
 """
 
@@ -13,6 +15,7 @@ import math
 import numpy as np
 from numba import njit
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from surgisim.phantom.families import stepping
 from surgisim.phantom.families.hidden import Hidden
@@ -40,6 +43,10 @@ EIGHT = np.array(
     [[0, 4, 6, 7], [4, 1, 5, 8], [6, 5, 2, 9], [7, 8, 9, 3], [4, 5, 6, 7], [4, 8, 5, 7], [5, 9, 6, 7], [5, 8, 9, 7]]
 )
 """A tetrahedron of ten nodes as eight of four."""
+JOINED, JOINED_IN_TUBES = 24, 44
+"""Points that one is joined to, about. A tube's cells are longer than its wall is thick, so fewer directions are there."""
+DIRECTIONS, ROUNDS = 45, 400
+"""In which springs are made alike, and how often they are corrected."""
 TORN = 0.8
 """Most of its stiffness that a spring loses [1]."""
 
@@ -58,15 +65,14 @@ class Springs:
         volume = np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6
         tets[volume < 0] = tets[volume < 0][:, [0, 1, 3, 2]]
         self.tets, self.volume = np.ascontiguousarray(tets), np.abs(volume)
-        pairs = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
-        ends, where = np.unique(np.sort(tets[:, pairs].reshape(-1, 2), 1), axis=0, return_inverse=True)
+        around = np.bincount(tets.ravel(), np.repeat(self.volume, 4) / 4, len(self.rest))
+        self.mass = around * law.density
+        ends = joined(self.rest, tets, JOINED_IN_TUBES if body.kind == "tube" else JOINED)
         self.ends = np.ascontiguousarray(ends)
         way = self.rest[ends[:, 1]] - self.rest[ends[:, 0]]
         self.length = np.linalg.norm(way, axis=1)
-        around = np.bincount(where.reshape(-1), np.repeat(self.volume, 6), len(ends))
-        self.mass = np.bincount(tets.ravel(), np.repeat(self.volume, 4) / 4, len(self.rest)) * law.density
-        self.k = law.E * around / self.length**2
-        self.bulk = max(law.bulk - 2 * law.E / 3, 0.0)
+        self.k = law.mu * alike(way / self.length[:, None], ends, around) / self.length**2
+        self.bulk = max(law.bulk - 5 * law.mu / 3, 0.0)
         self.lag = law.eta / law.E
         self.law, self.hidden, self.way = law, hidden, way
         middle_of = self.rest[ends].mean(1)
@@ -141,6 +147,44 @@ class Springs:
 
     def read(self, x):
         return self._reader(x - self.rest)
+
+
+def joined(rest: np.ndarray, tets: np.ndarray, count: int) -> np.ndarray:
+    """Pairs of points, (S, 2), nearest by their own surroundings' measure, so that a point has `count` of them about.
+
+    Where a mesh is finer along one direction than along others, as near is what is as many cells away.
+    """
+    corner = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
+    edges = np.unique(np.sort(tets[:, corner].reshape(-1, 2), 1), axis=0)
+    way = rest[edges[:, 1]] - rest[edges[:, 0]]
+    spread, edges_of = np.zeros((len(rest), 3, 3)), np.bincount(edges.ravel(), minlength=len(rest))
+    for end in (0, 1):
+        np.add.at(spread, edges[:, end], way[:, :, None] * way[:, None, :])
+    measure = np.linalg.inv(spread / edges_of[:, None, None])
+    pairs = cKDTree(rest).query_pairs(2.2 * np.linalg.norm(way, axis=1).max(), output_type="ndarray")
+    apart = rest[pairs[:, 1]] - rest[pairs[:, 0]]
+    away = np.einsum("si,sij,sj->s", apart, measure[pairs[:, 0]] + measure[pairs[:, 1]], apart)
+    return pairs[np.argsort(away, kind="stable")[: len(rest) * count // 2]]
+
+
+def alike(way: np.ndarray, ends: np.ndarray, around: np.ndarray) -> np.ndarray:
+    """k L0^2 over the shear modulus of each spring [m^3], (S,), by which points' surroundings are alike all around.
+
+    way: unit vectors, (S, 3); around: volume of each point [m^3]. A uniaxial strain along a direction m stores
+    sum k L0^2 (n m)^4 / 2 about a point, and 3 mu V / 2 in such a solid: weights are raised and lowered by how much is
+    missing (ISRA, De Pierro 1987), which keeps them from changing sign.
+    """
+    rows, columns = ends.T.ravel(), np.tile(np.arange(len(ends)), 2)
+    half = sparse.coo_matrix((np.full(2 * len(ends), 0.5), (rows, columns)), (len(around), len(ends))).tocsr()
+    n = np.arange(DIRECTIONS) + 0.5
+    polar, turn = np.arccos(1 - n / DIRECTIONS), np.pi * (1 + math.sqrt(5)) * n
+    directions = np.stack([np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)])
+    stored = (way @ directions) ** 4
+    wanted = (half.T @ np.repeat(3 * around[:, None], DIRECTIONS, 1) * stored).sum(1)
+    weight = half.T @ (15 * around / (half @ np.ones(len(ends))))
+    for _ in range(ROUNDS):
+        weight = weight * wanted / (half.T @ (half @ (weight[:, None] * stored)) * stored).sum(1)
+    return weight
 
 
 @njit(cache=True, error_model="numpy")
