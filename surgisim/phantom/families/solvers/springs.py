@@ -6,8 +6,9 @@
 A point is joined to those about it, and the springs' constants k >= 0 are those by which its surroundings come nearest
 to a solid that is alike in all directions: sum k L0^2 (n n n n) = mu V (dd + dd + dd), n their directions (Cauchy's
 relation: lambda = mu). Edges of a mesh alone have shear moduli that differ threefold between directions; these differ
-by some per cent, in a tube by up to a third. The volumes raise Poisson's ratio. What is hidden in the tissue is written for springs: they stiffen with the square of their strain, creep,
-take a set, tear in part, shorten, and are more along some direction than along others.
+by some per cent, in a tube by up to a third. The volumes raise Poisson's ratio. What is hidden in the tissue is written
+for springs: they stiffen with the square of their strain, creep, take a set, tear in part, shorten, and are more along
+some direction than along others.
 """
 
 import math
@@ -44,7 +45,7 @@ EIGHT = np.array(
 )
 """A tetrahedron of ten nodes as eight of four."""
 JOINED, JOINED_IN_TUBES = 24, 44
-"""Points that one is joined to, about. A tube's cells are longer than its wall is thick, so fewer directions are there."""
+"""Points that one is joined to, about. A tube's cells are longer than its wall is thick: there fewer are not enough."""
 DIRECTIONS, ROUNDS = 45, 400
 """In which springs are made alike, and how often they are corrected."""
 TORN = 0.8
