@@ -36,6 +36,8 @@ STEADIER = 1.25
 """Times the drift that rest shows beyond which the one that all frames ask for is another; chosen."""
 MORE = 1.5
 """Times the drift that a base was fitted beside beyond which it is fitted again; chosen."""
+NEAR = 0.25
+"""Prior standard deviations of a base's numbers within which other grips change its tracks by the same; chosen."""
 FIRSTS = 2
 """Laws beside which a second one is looked for."""
 
@@ -208,13 +210,13 @@ def hazy(case: Case, laws: Scores) -> bool:
 
 def prepare_case(
     clip: Clip, settings: Diagnosing, memo: Memo, progress: Progress, begun: Base | None = None,
-    drift: np.ndarray | None = None,
+    drift: np.ndarray | None = None, others: list[Group] | None = None,
 ) -> Case:  # fmt: skip
     """Noise, base, nuisances, with the drift of the camera that is likeliest without any law.
 
     begun: a base of nearly the same body; drift: how far the camera may drift over the clip beside it [m], (3,), as at
-    rest if None. A base fitted beside much less than all fitted frames then ask for made up for the camera, and
-    is fitted again.
+    rest if None; others: `nuisance.other_bodies` beside `begun`, which serve again where the base stays NEAR it. A base
+    fitted beside much less than all fitted frames then ask for made up for the camera, and is fitted again.
     """
     until = clip.until
     fitted = slice(0, until)
@@ -238,7 +240,10 @@ def prepare_case(
         workers=workers(clip, settings), timing="release" not in settings.without, begun=begun,
         say=lambda text: progress(0.1, 1, text),
     )  # fmt: skip
-    groups = nuisance.of_laws(clip, base, drift, noise, memo, settings, workers(clip, settings))
+    if others is None or (np.abs(base.x - begun.x) > NEAR * clip.prior.spread).any():
+        progress(0.2, 1, "other grips, held tissue and elastic laws")
+        others = nuisance.other_bodies(clip, base, memo, workers(clip, settings))
+    groups = nuisance.of_laws(clip, base, drift, noise, settings, others)
     fixed = whitened(whiten, groups, until)
     space = metric(np.concatenate([fixed, whiten(base.slopes).T], 1))
     slopes = slice(fixed.shape[1], fixed.shape[1] + len(base.slopes))
@@ -251,7 +256,7 @@ def prepare_case(
     likeliest = case.likeliest_drift()
     if begun is None and (likeliest > MORE * drift).any():
         progress(0.2, 1, f"the base beside a camera that drifts by {1e3 * likeliest.max():.2g} mm")
-        return prepare_case(clip.less(None), settings, memo, progress, base, np.maximum(drift, likeliest))
+        return prepare_case(clip.less(None), settings, memo, progress, base, np.maximum(drift, likeliest), others)
     return case.drifting(likeliest)
 
 

@@ -88,14 +88,14 @@ def of_base(
 
 
 def of_laws(
-    clip: Clip, base: Base, drift: np.ndarray, noise: Noise, memo: Memo, settings: Diagnosing, workers: int
+    clip: Clip, base: Base, drift: np.ndarray, noise: Noise, settings: Diagnosing, others: list[Group]
 ) -> list[Group]:
-    """What laws are fitted with: the same, and grips, held tissue and elastic laws that may be others."""
-    near, moved = base.tangent, HELD * by_held(clip, base.x, base.simulated, memo)
-    groups = [*other_bodies(clip, base, memo, workers), firmness(clip, near), path(clip, near), closing(clip, near)]
-    groups.append(perceived.edge(clip, near))
-    if moved.any():
-        groups.append(Group("held", moved[None], (("where what is held ends", HELD, "m"),)))
+    """What laws are fitted with: the same, and grips, held tissue and elastic laws that may be others.
+
+    others: `other_bodies` near this base.
+    """
+    near = base.tangent
+    groups = [*others, firmness(clip, near), path(clip, near), closing(clip, near), perceived.edge(clip, near)]
     gradient = displacement_gradient(base.prepared, clip, base.run)
     error = np.zeros_like(base.simulated) if clip.error is None else clip.error
     return of_base(clip, base.simulated, error, gradient, drift, noise, settings) + chosen(groups, settings)
@@ -254,7 +254,8 @@ def _askew(error: np.ndarray, spans: list[np.ndarray], alike: np.ndarray, patter
 
 
 def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group]:
-    """Grips of another size or place, or that open sooner, and tissue of another elastic law, by the engine."""
+    """Grips of another size or place, or that open sooner, tissue of another elastic law, and what is held ending
+    elsewhere, by the engine."""
     motion, wide, trials = clip.motion, widened(clip.motion.radius, clip.body.spacing), []
     u, v = plane(clip)
     for j in range(len(motion.radius)):
@@ -302,6 +303,9 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
             groups[name] = Group(name, np.concatenate([before.columns, change[None]]), (*before.values, told))
     if "grip radius" in groups:
         groups["grip radius"] = _of_one_instrument(_not_a_ball(clip, groups["grip radius"]))
+    held = HELD * by_held(clip, base.x, base.simulated, memo)
+    if held.any():
+        groups["held"] = Group("held", held[None], (("where what is held ends", HELD, "m"),))
     return list(groups.values())
 
 

@@ -39,6 +39,9 @@ KEPT = ((1, 5), (2, 3))
 """Steps that every descent still tried goes, and how many go on then."""
 DESCENTS = 8
 """Steps at most of those that are left."""
+HOPED = 3.0
+"""Times what the parabola under a descent promises that its next steps may take off; chosen. One that would then still
+be no body that is drawn once (DRAWS, calibration.ALIKE_ERRORS) goes no further."""
 SAME = 0.1
 """Prior standard deviations within which two descents are one."""
 ALIKE = 2.0
@@ -203,8 +206,8 @@ class RingDown:
         """Where descents from all over the range got to, best first; those given up early are among them."""
         going, ended = self.starts() if tries is None else tries, []
         for steps, keep in (*KEPT, (DESCENTS, 0)):
-            for each in going:
-                self.descend(each, say, steps)
+            for each in sorted(going, key=lambda d: d.cost):
+                self.descend(each, say, steps, min(d.cost for d in (*going, *ended)))
             single = self.distinct(going, SAME)
             ended += single[keep:]
             going = single[:keep]
@@ -219,8 +222,11 @@ class RingDown:
                 single.append(each)
         return single
 
-    def descend(self, at: Descent, say: Callable[[str], None], steps: int = DESCENTS) -> None:
-        """Levenberg-Marquardt, some steps on."""
+    def descend(
+        self, at: Descent, say: Callable[[str], None], steps: int = DESCENTS, best: float = np.inf
+    ) -> None:
+        """Levenberg-Marquardt, some steps on; best: cost of the best descent so far, which leaves no hope to some."""
+        far = best + 2 * calibration.ALIKE_ERRORS * math.log(DRAWS)
         for _ in range(steps):
             if at.done or at.left is None:
                 return
@@ -228,6 +234,9 @@ class RingDown:
             slopes = self.slopes(at.y)
             normal, pull = self.normal(slopes, at.y), self.pull(slopes, at)
             before = at.cost
+            if before - HOPED * float(pull @ np.linalg.solve(normal, pull)) > far:
+                at.done = True
+                return
             if not self._downhill(at, normal, pull):
                 at.done = True
                 return

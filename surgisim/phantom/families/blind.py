@@ -101,7 +101,8 @@ def _borne(world: World, engine: Solver) -> tuple[World, np.ndarray]:
 def _hide(name, world, plain, engine, free, seeing, rng, say) -> tuple[np.ndarray, Hidden, float]:
     """Paths with it [m], what it is, and the log evidence that an oracle has of it."""
     law, fitted = world.material, slice(0, world.split)
-    other = replace(law, nu=law.nu - 0.04), replace(law, eta=1.25 * law.eta)
+    stiffer = replace(law, E=1.25 * law.E, eta=1.25 * law.eta)
+    other = stiffer, replace(law, nu=law.nu - 0.04), replace(law, eta=1.25 * law.eta)
     base = [engine.paths(world.of_material(m), ()) - plain for m in other]
     base += [np.gradient(plain, axis=1), plain - plain[:, :1]]
     base = [d[:, fitted] for d in base]
