@@ -222,9 +222,7 @@ class RingDown:
                 single.append(each)
         return single
 
-    def descend(
-        self, at: Descent, say: Callable[[str], None], steps: int = DESCENTS, best: float = np.inf
-    ) -> None:
+    def descend(self, at: Descent, say: Callable[[str], None], steps: int = DESCENTS, best: float = np.inf) -> None:
         """Levenberg-Marquardt, some steps on; best: cost of the best descent so far, which leaves no hope to some."""
         far = best + 2 * calibration.ALIKE_ERRORS * math.log(DRAWS)
         for _ in range(steps):

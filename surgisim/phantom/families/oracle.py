@@ -1,8 +1,9 @@
 """How surely somebody who knows law, base and solver would see what is hidden.
 
 The log evidence of a change d of the paths over nothing is half of |W P d|^2: W divides by the tracking noise, P takes
-out what could as well be the base (modulus, Poisson's ratio, viscosity), the timing and firmness of the grips, a constant error
-of each point, and the camera where it moves. A ratio of RMS would not compare between points, frames and families.
+out what could as well be the base (modulus, Poisson's ratio, viscosity), the timing and firmness of the grips, a
+constant error of each point, and the camera where it moves. A ratio of RMS would not compare between points, frames and
+families.
 """
 
 import numpy as np
