@@ -39,6 +39,9 @@ KEPT = ((1, 5), (2, 3))
 """Steps that every descent still tried goes, and how many go on then."""
 DESCENTS = 8
 """Steps at most of those that are left."""
+HOPELESS = 4.0
+"""Times the best stiffness' cost at a middling viscosity beyond which another one is not tried with other viscosities
+and moments of release; chosen. Stiff bodies of high viscosity take the shortest steps by far."""
 HOPED = 3.0
 """Times what the parabola under a descent promises that its next steps may take off; chosen. One that would then still
 be no body that is drawn once (DRAWS, calibration.ALIKE_ERRORS) goes no further."""
@@ -184,23 +187,29 @@ class RingDown:
         return Descent(y, left, self.cost(y, left), self.owed(y))
 
     def starts(self) -> list[Descent]:
-        """Where the run began, and the best viscosity and moment of release for each stiffness."""
+        """Where the run began, and the best viscosity and moment of release for each stiffness that is not hopeless."""
         steady = self.steady()
         late = (0.0,) if len(steady) == 3 else MOMENTS
-        ways = [(lag, late[len(late) // 2]) for lag in LAGS] + [(LAGS[1], t) for t in (late[0], late[-1]) if late[1:]]
-        tries, groups = [steady], [0]
-        for n, e in enumerate(STIFFNESSES, 1):
-            for lag, opens in ways:
+        middle, others = (LAGS[1], late[len(late) // 2]), [(lag, late[len(late) // 2]) for lag in LAGS[::2]]
+        others += [(LAGS[1], t) for t in (late[0], late[-1]) if late[1:]]
+
+        def tried(ways: list[tuple[float, tuple[float, float]]]) -> list[Descent]:
+            tries = []
+            for e, (lag, opens) in ways:
                 y = steady.copy()
                 y[[0, 2]], y[3:] = (e, lag), opens
                 # What may not be tried as it is is no start of its own.
-                if np.allclose(self.bounded(y), y):
-                    tries.append(y)
-                    groups.append(n)
-        found = at_once(self.begun, tries, len(self.bodies))
-        best = [min((d for d, k in zip(found, groups, strict=True) if k == n), key=lambda d: d.cost, default=None)
-                for n in range(len(STIFFNESSES) + 1)]  # fmt: skip
-        return [d for d in best if d is not None and np.isfinite(d.cost)]
+                tries += [y] if np.allclose(self.bounded(y), y) else []
+            return at_once(self.begun, tries, len(self.bodies))
+
+        begun = self.begun(steady)
+        plain = tried([(e, middle) for e in STIFFNESSES])
+        far = HOPELESS * max(self.whiten.free, min(d.cost for d in (begun, *plain)))
+        worth = [d for d in plain if d.cost < far]
+        best = {d.y[0]: d for d in worth}
+        for each in tried([(e, way) for e in best for way in others]):
+            best[each.y[0]] = min(best[each.y[0]], each, key=lambda d: d.cost)
+        return [d for d in (begun, *best.values()) if np.isfinite(d.cost)]
 
     def descents(self, say: Callable[[str], None], tries: list[Descent] | None = None) -> list[Descent]:
         """Where descents from all over the range got to, best first; those given up early are among them."""

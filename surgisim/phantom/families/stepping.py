@@ -171,7 +171,9 @@ class _Moving:
                     more = np.zeros_like(self.points.rest)
                     more[self.taken[j].points] = self.taken[j].spring[:, None]
                     matrix = matrix + sparse.diags(more.ravel())
-            self.solves[active] = free, splu(matrix[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A")
+            # Symmetric and positive: pivots off the diagonal would only fill it.
+            whole = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+            self.solves[active] = free, splu(matrix[free][:, free].tocsc(), **whole)
         return self.solves[active]
 
 

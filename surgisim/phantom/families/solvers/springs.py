@@ -46,8 +46,8 @@ EIGHT = np.array(
 """A tetrahedron of ten nodes as eight of four."""
 JOINED, JOINED_IN_TUBES = 24, 44
 """Points that one is joined to, about. A tube's cells are longer than its wall is thick: there fewer are not enough."""
-DIRECTIONS, ROUNDS = 45, 400
-"""In which springs are made alike, and how often they are corrected."""
+DIRECTIONS, ROUNDS, PACE = 45, 220, 1.7
+"""In which springs are made alike, how often they are corrected, and the power to which each correction is taken."""
 TORN = 0.8
 """Most of its stiffness that a spring loses [1]."""
 
@@ -184,7 +184,7 @@ def alike(way: np.ndarray, ends: np.ndarray, around: np.ndarray) -> np.ndarray:
     wanted = (half.T @ np.repeat(3 * around[:, None], DIRECTIONS, 1) * stored).sum(1)
     weight = half.T @ (15 * around / (half @ np.ones(len(ends))))
     for _ in range(ROUNDS):
-        weight = weight * wanted / (half.T @ (half @ (weight[:, None] * stored)) * stored).sum(1)
+        weight *= (wanted / (half.T @ (half @ (weight[:, None] * stored)) * stored).sum(1)) ** PACE
     return weight
 
 
