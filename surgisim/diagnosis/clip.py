@@ -6,6 +6,7 @@ import numpy as np
 
 from surgisim.artifacts.body import Body
 from surgisim.artifacts.motion import Motion
+from surgisim.diagnosis import strays
 from surgisim.diagnosis.prior import Prior, prior_of
 from surgisim.estimation.rim import Rim
 from surgisim.mpm.grip import runs
@@ -65,6 +66,8 @@ class Clip:
     None where that is not known."""
     edge: Rim | None = None
     """What the edge of the picture was seen to do, where that does not drive the body."""
+    strayed: int = 0
+    """Samples of its points that are left out, since they are another point's (`strays.py`)."""
 
     @property
     def frames(self) -> int:
@@ -236,11 +239,16 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
             f"recording {recording.name}: {until} frames may be fitted, at least 8 are needed. Mend split.json."
         )
     kept = kept[_apart(rest[kept], recording.visible[kept, :until].mean(1), MOST)]
-    seen = recording.visible[kept].copy()
+    seen, strayed = recording.visible[kept].copy(), 0
+    if not recording.astray:
+        # Of a video's tracks, what steps aside is a nuisance of its own (`perceived.jumps`).
+        there = np.where(recording.visible[..., None], recording.points.astype(float) - rest[:, None], 0.0)
+        away = strays.strayed(rest, there, recording.visible, motion)[kept]
+        seen, strayed = seen & ~away, int((seen & away).sum())
     moved = recording.points[kept].astype(float) - rest[kept][:, None]
     moved = np.where(seen[..., None], moved, 0.0)
     normal = _normal(body, rest[kept])
-    return Clip(recording, body, kept, rest[kept], seen, moved, until, normal, device, edge=edge)
+    return Clip(recording, body, kept, rest[kept], seen, moved, until, normal, device, edge=edge, strayed=strayed)
 
 
 def _undriven(recording: Recording) -> tuple[Recording, Rim | None]:

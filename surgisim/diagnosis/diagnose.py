@@ -127,7 +127,8 @@ def first_look(
 ) -> tuple[Case, list[Finding]]:
     """Noise, base, nuisances, and all that is cheap to try. Raises Problem where the recording cannot be used."""
     clip = clip_of(recording, share=settings.grid, device=settings.device)
-    progress(0.01, 1, f"noise of {len(clip.kept)} points on {clip.until} frames")
+    out = f", without {clip.strayed} samples of other points" if clip.strayed else ""
+    progress(0.01, 1, f"noise of {len(clip.kept)} points on {clip.until} frames{out}")
     case = prepare_case(clip, settings, memo, progress)
 
     def looked(case: Case) -> list[Finding]:

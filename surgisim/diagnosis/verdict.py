@@ -109,7 +109,7 @@ def write(
         forces={} if case.base.pulls is None else case.base.pulls.told(case.base.x),
         as_given=[name for name in case.base.as_given if name in clip.recording.expected],
         base=base_numbers(case.base),
-        noise=noise.told(),
+        noise=noise.told() | {"strayed": clip.strayed},
         global_test={
             "log_evidence": float(laws[ranked[0]].evidence),
             "nulls": np.round(highest(laws), 3).tolist(),

@@ -9,7 +9,7 @@ from planted import GRID, TRUE, case_of, memo_of, plain, recording
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import base_fit as fitting
-from surgisim.diagnosis import ring_down
+from surgisim.diagnosis import diagnose, nuisance, ring_down
 from surgisim.diagnosis.base import Base, Known, tracks_of
 from surgisim.diagnosis.calibration import ALIKE_ERRORS, MISFIT
 from surgisim.diagnosis.clip import OPENS, clip_of
@@ -52,6 +52,43 @@ def test_of_bodies_that_look_alike_the_softest_is_taken(dearer, softest):
     soft, stiff = (START + by * np.eye(3)[0] for by in (-1.0, 1.0))
     ends = [ring_down.Descent(y, None, cost) for y, cost in ((stiff, 100.0), (soft, 100.0 + dearer))]
     assert ring_down.softest(ends).y is (soft if softest else stiff)
+
+
+@pytest.mark.parametrize(("slope", "goes"), [(1.0, False), (30.0, True)])
+def test_a_descent_that_its_parabola_gives_no_hope_goes_no_further(slope, goes):
+    """A parabola of slope s and curvature 1 promises s^2 off the cost."""
+    steps = []
+    around = SimpleNamespace(
+        whiten=SimpleNamespace(free=100), slopes=lambda y: None, normal=lambda slopes, y: np.eye(3),
+        pull=lambda slopes, at: slope * np.eye(3)[0], _downhill=lambda at, *_: steps.append(at) or False,
+    )  # fmt: skip
+    at = ring_down.Descent(START, np.zeros(1), 1000.0)
+    ring_down.RingDown.descend(around, at, lambda text: None, 5, best=300.0)
+    assert at.done
+    assert bool(steps) == goes
+    # Alone it is the best there is.
+    at = ring_down.Descent(START, np.zeros(1), 1000.0)
+    ring_down.RingDown.descend(around, at, lambda text: None, 5)
+    assert steps[-1:] == [at]
+
+
+def test_a_stiffness_without_hope_is_not_tried_with_other_viscosities():
+    tried = []
+
+    def begun(y, body=0):
+        tried.append(y)
+        cost = 100.0 + 2000.0 * abs(y[0] - ring_down.STIFFNESSES[2]) + 10.0 * abs(y[2] - ring_down.LAGS[0])
+        return ring_down.Descent(y, np.zeros(1), cost)
+
+    around = SimpleNamespace(
+        steady=lambda: np.append(START, 0.5), bounded=lambda y: y, begun=begun, bodies=[None],
+        whiten=SimpleNamespace(free=100),
+    )  # fmt: skip
+    found = ring_down.RingDown.starts(around)
+    alone = [e for e in ring_down.STIFFNESSES if sum(y[0] == e for y in tried) == 1]
+    assert set(ring_down.STIFFNESSES) - set(alone) == set(ring_down.STIFFNESSES[2:3])
+    assert [d.y[0] for d in found] == [START[0], ring_down.STIFFNESSES[2]]
+    assert found[1].y[2] == ring_down.LAGS[0]
 
 
 def test_bodies_that_fit_about_as_well_are_part_of_how_surely_one_is_known():
@@ -228,3 +265,17 @@ def test_what_numbers_are_raised_by_belongs_to_a_spacing():
     assert clip.on_grid(np.append(TRUE, 0.5)) == pytest.approx(TRUE + clip.stiffer)
     assert clip.laid(raised=1e-3).on_grid(TRUE) == pytest.approx(clip.on_grid(TRUE))
     assert clip.laid(share=0.9 * GRID).on_grid(TRUE) == pytest.approx(TRUE)
+
+
+@pytest.mark.parametrize(("far", "times"), [(0.2, 0), (0.3, 1)])
+def test_other_grips_serve_again_where_a_base_stays_near(monkeypatch, far, times):
+    made, first, ran = recording(), plain(), []
+    monkeypatch.setattr(diagnose, "fit_base", lambda clip, *_, **__: (clip, first.base, None))
+    monkeypatch.setattr(diagnose, "settled", lambda clip, fine, whiten, space, slopes, base, memo: (clip, base))
+    monkeypatch.setattr(nuisance, "other_bodies", lambda *_: ran.append(1) or groups)
+    groups = [g for g in first.groups if g.name in ("grip radius", "held")]
+    begun = replace(first.base, x=first.base.x + far * SPREAD * np.eye(3)[0])
+    settings, drift = Diagnosing(grid=GRID, nulls=8), np.full(3, 1e-4)
+    case = diagnose.prepare_case(first.clip, settings, memo_of(made), lambda *_: None, begun, drift, groups)
+    assert len(ran) == times
+    assert {"grip radius", "held", "drift"} <= {g.name for g in case.groups}
