@@ -243,7 +243,7 @@ def clip_of(recording: Recording, *, share: float = SHARE, device: str = "cpu") 
     if not recording.astray:
         # Of a video's tracks, what steps aside is a nuisance of its own (`perceived.jumps`).
         there = np.where(recording.visible[..., None], recording.points.astype(float) - rest[:, None], 0.0)
-        away = strays.strayed(rest, there, recording.visible, motion)[kept]
+        away = strays.strayed(rest, there, recording.visible, motion, recording.fps)[kept]
         seen, strayed = seen & ~away, int((seen & away).sum())
     moved = recording.points[kept].astype(float) - rest[kept][:, None]
     moved = np.where(seen[..., None], moved, 0.0)

@@ -17,11 +17,14 @@ CLEAR_STEP, APART = 3.2, 3.0
 """How far a track must step aside from the middle one of its neighbours to have strayed: times the middle step aside of
 its own and of all tracks, and times what that middle neighbour does. Of white noise 3.2 middle steps are 4.9 standard
 deviations along an axis, as far as one sample in 30 000 goes; chosen."""
-BACK = 0.5
-"""Share of a step aside within which the step back must undo it; chosen."""
-REACH, PARTNERS = 2.0, 3
-"""Radii of a grip within which tissue may step aside, so that only what changes places with one of the nearest tracks
-has strayed; chosen."""
+BACK = 0.6
+"""Share of the larger of a step aside and the step back within which they must undo one another, since tissue strains
+meanwhile; chosen."""
+SOME = 5
+"""Samples before and after a step that say where a track lies."""
+REACH, RINGS, PARTNERS = 2.0, 0.5, 3
+"""Radii of a grip within which tissue may step aside, from when it closes to so long [s] after it opened: there only
+what also steps aside at another time, or changes places with one of so many nearest tracks, has strayed; chosen."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +48,15 @@ class _Aside:
         n = int(np.searchsorted(self.frames, frame)) - 1
         if n < 0 or n + 1 >= len(self.frames) or self.frames[n + 1] != frame:
             return False
-        return bool(np.linalg.norm(self.steps[n] + step) < BACK * np.linalg.norm(step))
+        return _undone(self.steps[n], step)
 
 
-def strayed(rest: np.ndarray, moved: np.ndarray, seen: np.ndarray, motion: Motion) -> np.ndarray:
+def _undone(out: np.ndarray, back: np.ndarray) -> bool:
+    """Whether steps [m], (3,) each, undo one another."""
+    return bool(np.linalg.norm(out + back) < BACK * max(np.linalg.norm(out), np.linalg.norm(back)))
+
+
+def strayed(rest: np.ndarray, moved: np.ndarray, seen: np.ndarray, motion: Motion, fps: float) -> np.ndarray:
     """Which samples are another point's, (K, T) bool.
 
     rest: where points sit at rest [m], (K, 3); moved: their displacement [m], (K, T, 3); seen: (K, T) bool.
@@ -64,9 +72,10 @@ def strayed(rest: np.ndarray, moved: np.ndarray, seen: np.ndarray, motion: Motio
             path[k, :, a] = np.interp(frame, frame[seen[k]], moved[k, seen[k], a])
     apart = np.linalg.norm(rest[points][:, None] - rest[points][None], axis=-1)
     near = np.argsort(apart, axis=1)[:, 1 : BESIDE + 1]
-    free = np.ones(len(points), bool)
-    for center, radius in zip(motion.center_rest, motion.radius, strict=True):
-        free &= np.linalg.norm(rest[points] - center, axis=1) > REACH * radius
+    gripped = np.zeros((len(points), seen.shape[1]), bool)
+    for center, radius, active in zip(motion.center_rest, motion.radius, motion.active, strict=True):
+        acts = np.convolve(active, np.ones(2 + round(RINGS * fps)))[: seen.shape[1] + 1] > 0
+        gripped |= (np.linalg.norm(rest[points] - center, axis=1) <= REACH * radius)[:, None] & (acts[1:] | active)
     tracks = []
     for k, others in zip(points, near, strict=True):
         there = frame[seen[k]]
@@ -74,16 +83,17 @@ def strayed(rest: np.ndarray, moved: np.ndarray, seen: np.ndarray, motion: Motio
         tracks.append(_Aside(there, moved[k, there] - beside, beside))
     middles = np.array([np.median(np.linalg.norm(t.steps, axis=1)) for t in tracks])
     usual = float(np.median(middles))
-    for k, track, middle, alone, others in zip(points, tracks, middles, free, near, strict=True):
-        partners = None if alone else [tracks[j] for j in others[:PARTNERS]]
-        gone[k, _away(track, CLEAR_STEP * max(middle, usual), partners)] = True
+    for k, track, middle, by_grip, others in zip(points, tracks, middles, gripped, near, strict=True):
+        partners = [tracks[j] for j in others[:PARTNERS]]
+        gone[k, _away(track, CLEAR_STEP * max(middle, usual), by_grip, partners)] = True
     return gone
 
 
-def _away(track: _Aside, least: float, partners: list[_Aside] | None) -> np.ndarray:
+def _away(track: _Aside, least: float, by_grip: np.ndarray, partners: list[_Aside]) -> np.ndarray:
     """Frames between a step aside of more than `least` [m] and the one that undoes it.
 
-    partners: of which one must make the opposite steps, where given.
+    by_grip: frames in which a grip may make it step, (T,) bool; where it may have made both steps, one of `partners`
+    must make the opposite ones.
     """
     steps, size = track.steps, np.linalg.norm(track.steps, axis=1)
     theirs = np.linalg.norm(np.diff(track.beside, axis=0), axis=1)
@@ -92,17 +102,23 @@ def _away(track: _Aside, least: float, partners: list[_Aside] | None) -> np.ndar
     n = 0
     while n + 1 < len(large):
         out = large[n]
-        back = next(
-            (m for m in range(n + 1, len(large)) if np.linalg.norm(steps[out] + steps[large[m]]) < BACK * size[out]),
-            None,
-        )
-        swapped = back is not None and (
-            partners is None
-            or any(all(p.undoes(int(track.frames[m + 1]), steps[m]) for m in (out, large[back])) for p in partners)
-        )
-        if not swapped:
+        back = next((m for m in range(n + 1, len(large)) if _undone(steps[out], steps[large[m]])), None)
+        if back is not None and not _stays(track.off, out, large[back]):
+            back = None
+        if back is not None:
+            both = [(int(track.frames[m + 1]), steps[m]) for m in (out, large[back])]
+            if all(by_grip[t] for t, _ in both) and not any(all(p.undoes(*one) for one in both) for p in partners):
+                back = None
+        if back is None:
             n += 1
             continue
         found.append(track.frames[out + 1 : large[back] + 1])
         n = back + 1
     return np.concatenate(found) if found else np.zeros(0, int)
+
+
+def _stays(off: np.ndarray, out: int, back: int) -> bool:
+    """Whether a track lies aside after a step as the step says: what came back from one bad sample does not."""
+    before = np.median(off[max(out - SOME + 1, 0) : out + 1], axis=0)
+    aside = np.median(off[out + 1 : min(out + SOME, back) + 1], axis=0)
+    return bool(np.linalg.norm(aside - before) > 0.5 * np.linalg.norm(off[out + 1] - off[out]))

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from planted import GRID, recording
 
+from surgisim.artifacts.motion import Motion
 from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.strays import strayed
 from surgisim.recordings.recording import no_grips
 
-FRAMES, SIGMA = 60, 2e-4
+FRAMES, SIGMA, FPS = 60, 2e-4, 25.0
 
 
 def sheet(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -38,7 +39,7 @@ def swapped(rest, moved, frames: slice) -> tuple[np.ndarray, tuple[int, int]]:
 def test_noise_pull_and_release_leave_every_sample():
     for seed in range(5):
         rest, moved, seen = sheet(seed)
-        assert strayed(rest, moved, seen, no_grips(FRAMES)).sum() <= 1
+        assert strayed(rest, moved, seen, no_grips(FRAMES), FPS).sum() <= 1
 
 
 @pytest.mark.parametrize("frames", [slice(22, 29), slice(3, 4), slice(12, 48)])
@@ -46,7 +47,7 @@ def test_points_that_change_places_are_left_out_for_as_long_as_they_do(frames):
     rest, moved, seen = sheet()
     moved, pair = swapped(rest, moved, frames)
     seen[list(pair)] = True
-    gone = strayed(rest, moved, seen, no_grips(FRAMES))
+    gone = strayed(rest, moved, seen, no_grips(FRAMES), FPS)
     wanted = np.zeros(FRAMES, bool)
     wanted[frames] = True
     for k in pair:
@@ -58,19 +59,26 @@ def test_beside_a_grip_only_what_changes_places_has_strayed():
     rest, moved, seen = sheet()
     moved, (k, j) = swapped(rest, moved, slice(22, 29))
     seen[[k, j]] = True
-    here = replace(recording().motion, center_rest=rest[[k]], radius=np.array([5e-3]))
-    assert strayed(rest, moved, seen, here)[[k, j]].sum() == 14
+    active = (np.arange(FRAMES) >= 20)[None] & (np.arange(FRAMES) < 35)
+    position = np.repeat(rest[[k]][:, None], FRAMES, 1)
+    here = Motion(rest[[k]], np.array([5e-3]), position, active, np.ones(1), "given")
+    assert strayed(rest, moved, seen, here, FPS)[[k, j]].sum() == 14
     alone = moved.copy()
     alone[j] = sheet()[1][j]
-    assert not strayed(rest, alone, seen, here)[[k, j]].any()
-    assert strayed(rest, alone, seen, no_grips(FRAMES))[k].sum() == 7
+    assert not strayed(rest, alone, seen, here, FPS)[[k, j]].any()
+    assert strayed(rest, alone, seen, no_grips(FRAMES), FPS)[k].sum() == 7
+    # Before anything grips, nothing but a tracker steps aside; half a second after it has let go neither.
+    for frames in (slice(12, 29), slice(25, 55)):
+        moved, (k, j) = swapped(*sheet()[:2], frames)
+        moved[j] = sheet()[1][j]
+        assert strayed(rest, moved, seen, here, FPS)[k].sum() == frames.stop - frames.start
 
 
 def test_few_points_are_not_judged():
     rest, moved, seen = sheet()
     moved, pair = swapped(rest, moved, slice(22, 29))
     few = [*pair, *(k for k in range(5) if k not in pair)][:5]
-    assert not strayed(rest[few], moved[few], seen[few], no_grips(FRAMES)).any()
+    assert not strayed(rest[few], moved[few], seen[few], no_grips(FRAMES), FPS).any()
 
 
 def test_a_diagnosis_leaves_them_out_of_what_was_measured_and_not_of_a_video():
