@@ -38,14 +38,20 @@ MORE = 1.5
 """Times the drift that a base was fitted beside beyond which it is fitted again; chosen."""
 NEAR = 0.25
 """Prior standard deviations of a base's numbers within which other grips change its tracks by the same; chosen."""
+MOST_LONE = 3
+"""Tracks at most that are left out since they alone ask for a law; chosen."""
 FIRSTS = 2
 """Laws beside which a second one is looked for."""
 
 
 def diagnose(
-    recording: Recording, settings: Diagnosing, progress: Progress, memo: Memo
+    recording: Recording, settings: Diagnosing, progress: Progress, memo: Memo, lone: int = MOST_LONE
 ) -> tuple[Diagnosis, Physics, Mismatch]:
-    """What the recording's simulation lacks. Raises Problem where the recording cannot be used."""
+    """What the recording's simulation lacks. Raises Problem where the recording cannot be used.
+
+    lone: how many tracks that alone ask for a law may still be left out.
+    """
+    asked, runs = settings, memo
     case, findings = first_look(recording, settings, memo, progress)
     if hazy(case, by_law(findings)) and settings.replay < settings.grid:
         finer = settings.model_copy(update={"grid": settings.replay})
@@ -64,10 +70,27 @@ def diagnose(
     ranked, refits = sorted(laws, key=lambda term: -laws[term].evidence), []
     if detected:
         case, refits = compete(case, laws, ranked, progress)
+        k = judgement.lone(case, refits[0]) if lone else None
+        if k is not None:
+            return without_track(recording, int(clip.kept[k]), refits[0].term, asked, progress, runs, lone - 1)
     fitted = None
     if detected:
         refits, fitted = explained_by(case, refits, progress)
     return verdict.write(case, laws, ranked, refits, fitted, lambda text: progress(0.97, 1, text))
+
+
+def without_track(
+    recording: Recording, point: int, term: str, settings: Diagnosing, progress: Progress, memo: Memo, lone: int
+) -> tuple[Diagnosis, Physics, Mismatch]:
+    """The diagnosis without a point's track, which alone asked for a law, and says so."""
+    said = f"its track alone asked for {term.replace('_', ' ')}"
+    progress(0.01, 1, f"again without point {point}: {said}")
+    visible = recording.visible.copy()
+    visible[point] = False
+    found, physics, mismatch = diagnose(replace(recording, visible=visible), settings, progress, memo, lone)
+    noise = found.noise | {"left_out": [point, *found.noise.get("left_out", [])]}
+    words = f"{found.words} Point {point} was left out: {said}."
+    return replace(found, noise=noise, words=words), physics, mismatch
 
 
 def compete(case: Case, laws: Scores, ranked: list[str], progress: Progress) -> tuple[Case, list[Refit]]:

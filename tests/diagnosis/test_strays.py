@@ -1,12 +1,16 @@
 """Tracks that are another point's for a while are left out; tissue that steps aside beside a grip is not."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from planted import GRID, recording
+from planted import GRID, plain, recording
 
+from surgisim.artifacts.diagnosis import Diagnosis
 from surgisim.artifacts.motion import Motion
+from surgisim.config.diagnosis import Diagnosing
+from surgisim.diagnosis import diagnose, judgement
 from surgisim.diagnosis.clip import clip_of
 from surgisim.diagnosis.strays import strayed
 from surgisim.recordings.recording import no_grips
@@ -91,3 +95,38 @@ def test_a_diagnosis_leaves_them_out_of_what_was_measured_and_not_of_a_video():
     assert not clip.seen[mine][:, 6:12].any()
     assert not clip.moved[~clip.seen].any()
     assert clip_of(replace(other, astray=0.05), share=GRID).strayed == 0
+
+
+@pytest.mark.parametrize(("spread", "alone"), [(0.0, True), (3e-3, False)])
+def test_a_law_that_one_track_alone_asks_for_is_that_track_s(spread, alone):
+    case, k = plain(), 7
+    away = np.linalg.norm(case.clip.rest - case.clip.rest[k], axis=1)
+    share = np.exp(-0.5 * (away / max(spread, 1e-6)) ** 2)
+    response = 1e-3 * share[:, None, None] * case.clip.held[None, :, None] * np.array([1.0, 0.0, 0.0])
+    moved = (case.clip.moved + response) * case.clip.seen[..., None]
+    other = replace(case, clip=replace(case.clip, moved=moved))
+    refit = SimpleNamespace(response=response)
+    assert judgement.lone(other, refit) == (k if alone else None)
+    # What helps nobody is nobody's.
+    assert judgement.lone(case, refit) is None
+    video = replace(other.clip, recording=replace(other.clip.recording, astray=0.05))
+    assert judgement.lone(replace(other, clip=video), refit) is None
+
+
+def test_without_that_track_it_is_diagnosed_again_and_said(monkeypatch):
+    seen = []
+
+    def again(recording, settings, progress, memo, lone):
+        seen.append((recording.visible.any(1), lone))
+        base = {"E": {"value": 1.0}}
+        found = Diagnosis(
+            "r", "nothing detectable", [], [], {}, [], {}, {}, 0.0, "Nothing.", base, {"left_out": [3]}, {}
+        )
+        return found, None, None
+
+    monkeypatch.setattr(diagnose, "diagnose", again)
+    made = recording()
+    found, *_ = diagnose.without_track(made, 9, "hidden_contact", Diagnosing(), lambda *_: None, None, 2)
+    assert (np.flatnonzero(~seen[0][0]).tolist(), seen[0][1]) == ([9], 2)
+    assert found.noise["left_out"] == [9, 3]
+    assert found.words == "Nothing. Point 9 was left out: its track alone asked for hidden contact."
