@@ -29,7 +29,7 @@ class Diagnosis(JsonArtifact):
     base: dict[str, Any]
     """The base's parameters: value, low, high, unit."""
     noise: dict[str, Any]
-    """The tracks' noise as estimated."""
+    """The tracks' noise as estimated; how many samples `strayed`, and which points were `left_out`."""
     global_test: dict[str, Any]
     """Evidence of the best law, what nulls reach, and the threshold."""
     format: str = "surgisim-diagnosis/1"
