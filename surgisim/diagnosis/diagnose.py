@@ -24,6 +24,7 @@ from surgisim.diagnosis.noise import Whitener, by_frame, estimate, whitener
 from surgisim.diagnosis.nuisance import Group
 from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
 from surgisim.diagnosis.search import search, sharpened, threshold
+from surgisim.diagnosis.single_track import single_track
 from surgisim.estimation.trial import at_once
 from surgisim.mpm.simulator import Breakdown
 from surgisim.problem import Problem
@@ -38,18 +39,18 @@ MORE = 1.5
 """Times the drift that a base was fitted beside beyond which it is fitted again; chosen."""
 NEAR = 0.25
 """Prior standard deviations of a base's numbers within which other grips change its tracks by the same; chosen."""
-MOST_LONE = 3
+MOST_LEFT_OUT = 3
 """Tracks at most that are left out since they alone ask for a law; chosen."""
 FIRSTS = 2
 """Laws beside which a second one is looked for."""
 
 
 def diagnose(
-    recording: Recording, settings: Diagnosing, progress: Progress, memo: Memo, lone: int = MOST_LONE
+    recording: Recording, settings: Diagnosing, progress: Progress, memo: Memo, single: int = MOST_LEFT_OUT
 ) -> tuple[Diagnosis, Physics, Mismatch]:
     """What the recording's simulation lacks. Raises Problem where the recording cannot be used.
 
-    lone: how many tracks that alone ask for a law may still be left out.
+    single: how many tracks that alone ask for a law may still be left out.
     """
     asked, runs = settings, memo
     case, findings = first_look(recording, settings, memo, progress)
@@ -70,9 +71,9 @@ def diagnose(
     ranked, refits = sorted(laws, key=lambda term: -laws[term].evidence), []
     if detected:
         case, refits = compete(case, laws, ranked, progress)
-        k = judgement.lone(case, refits[0]) if lone else None
+        k = single_track(case, refits[0]) if single else None
         if k is not None:
-            return without_track(recording, int(clip.kept[k]), refits[0].term, asked, progress, runs, lone - 1)
+            return without_track(recording, int(clip.kept[k]), refits[0].term, asked, progress, runs, single - 1)
     fitted = None
     if detected:
         refits, fitted = explained_by(case, refits, progress)
@@ -80,14 +81,14 @@ def diagnose(
 
 
 def without_track(
-    recording: Recording, point: int, term: str, settings: Diagnosing, progress: Progress, memo: Memo, lone: int
+    recording: Recording, point: int, term: str, settings: Diagnosing, progress: Progress, memo: Memo, single: int
 ) -> tuple[Diagnosis, Physics, Mismatch]:
     """The diagnosis without a point's track, which alone asked for a law, and says so."""
     said = f"its track alone asked for {term.replace('_', ' ')}"
     progress(0.01, 1, f"again without point {point}: {said}")
     visible = recording.visible.copy()
     visible[point] = False
-    found, physics, mismatch = diagnose(replace(recording, visible=visible), settings, progress, memo, lone)
+    found, physics, mismatch = diagnose(replace(recording, visible=visible), settings, progress, memo, single)
     noise = found.noise | {"left_out": [point, *found.noise.get("left_out", [])]}
     words = f"{found.words} Point {point} was left out: {said}."
     return replace(found, noise=noise, words=words), physics, mismatch

@@ -27,10 +27,6 @@ REASONS = (
     "named", "faint", "ungrasped", "loose", "drawn", "little", "unbacked", "unfit", "unconfirmed", "refuted", "beaten",
 )  # fmt: skip
 
-ALONE, FEW = 0.9, 12
-"""Share of what a law takes off plain errors that one point has beyond which its track alone asks for it, and points
-below which that is not asked; chosen."""
-
 
 @dataclass(frozen=True)
 class Explanation:
@@ -438,21 +434,6 @@ def borne_out(case: Case, after: np.ndarray) -> float:
     before, left = (residual(case, s, False, rest_only=False)[:, :until] for s in both)
     change = float(((before - left) ** 2).sum())
     return float((before**2).sum() - (left**2).sum()) / change if change > 0 else -1.0
-
-
-def lone(case: Case, refit: Refit) -> int | None:
-    """The point whose track alone asks for a law; None where others do too, where points are few, or of a video.
-
-    What tissue does at one point it does around it too; what one track alone says may as well be the tracker's.
-    """
-    clip, until = case.clip, case.clip.until
-    if clip.recording.astray or len(clip.kept) < FEW:
-        return None
-    both = case.base.simulated, case.base.simulated + refit.response
-    before, left = (residual(case, s, False, rest_only=False)[:, :until] for s in both)
-    gain = ((before**2).sum((1, 2)) - (left**2).sum((1, 2))) / case.noise.each**2
-    k = int(gain.argmax())
-    return k if gain.sum() > 0 and gain[k] > ALONE * gain.sum() else None
 
 
 def reordered(refits: list[Refit], chosen: Explanation) -> list[Refit]:

@@ -1,8 +1,8 @@
-"""Samples of tracks that are another point's: a track that steps aside from all around it, and later steps back.
+"""Outliers of tracks (identity switches): a track that steps aside from all around it, and later steps back.
 
 A tracker takes a point for one beside it, or for something else, for a while. Noise of a size of its own says nothing
 of that: errors of millimetres in six frames look like a push. Tissue does not do it: what steps aside with a grip does
-so beside that grip alone.
+so beside that grip alone. Thresholds were chosen beside one opened recording (docs/diagnosis.md) and looked at on six.
 """
 
 from dataclasses import dataclass

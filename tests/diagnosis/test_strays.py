@@ -10,8 +10,9 @@ from planted import GRID, plain, recording
 from surgisim.artifacts.diagnosis import Diagnosis
 from surgisim.artifacts.motion import Motion
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis import diagnose, judgement
+from surgisim.diagnosis import diagnose
 from surgisim.diagnosis.clip import clip_of
+from surgisim.diagnosis.single_track import single_track
 from surgisim.diagnosis.strays import strayed
 from surgisim.recordings.recording import no_grips
 
@@ -106,18 +107,18 @@ def test_a_law_that_one_track_alone_asks_for_is_that_track_s(spread, alone):
     moved = (case.clip.moved + response) * case.clip.seen[..., None]
     other = replace(case, clip=replace(case.clip, moved=moved))
     refit = SimpleNamespace(response=response)
-    assert judgement.lone(other, refit) == (k if alone else None)
+    assert single_track(other, refit) == (k if alone else None)
     # What helps nobody is nobody's.
-    assert judgement.lone(case, refit) is None
+    assert single_track(case, refit) is None
     video = replace(other.clip, recording=replace(other.clip.recording, astray=0.05))
-    assert judgement.lone(replace(other, clip=video), refit) is None
+    assert single_track(replace(other, clip=video), refit) is None
 
 
 def test_without_that_track_it_is_diagnosed_again_and_said(monkeypatch):
     seen = []
 
-    def again(recording, settings, progress, memo, lone):
-        seen.append((recording.visible.any(1), lone))
+    def again(recording, settings, progress, memo, single):
+        seen.append((recording.visible.any(1), single))
         base = {"E": {"value": 1.0}}
         found = Diagnosis(
             "r", "nothing detectable", [], [], {}, [], {}, {}, 0.0, "Nothing.", base, {"left_out": [3]}, {}

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.stats import ttest_1samp
 
 from surgisim.artifacts.diagnosis import Diagnosis
 from surgisim.artifacts.mismatch import Mismatch
@@ -40,8 +41,8 @@ SUREST = 0.03
 way at 90 %, as much as two grids of a beam differ."""
 DOUBT = 0.05
 """Chance, over all laws together, at which one may foretell better than the base by accident and be named."""
-LEAST_BLOCKS, DRAWS = 6, 4000
-"""Swings below which points are drawn again instead, and how often."""
+LEAST_SWINGS = 6
+"""Swings held out below which points are compared instead; chosen."""
 Progress = Callable[[float, float, str], None]
 
 
@@ -172,19 +173,20 @@ def written(
 def surely_better(body: Body, base: Tried, law: Tried, held: Course, tried: int) -> bool:
     """Whether a law foretells what was held out better than the base, for certain beside `tried` laws.
 
-    What the law takes off the squares is drawn again, swing by swing, since errors last about that long; where fewer
-    than LEAST_BLOCKS were held out, point by point.
+    A one-sided t test of what the law takes off the squares in each swing, since errors last about that long; where
+    fewer than LEAST_SWINGS were held out, at each point. Bonferroni's correction over all laws.
     """
     before, after = (held.squares(body.moved(held, t.values, t.places)) for t in (base, law))
     off = before - after
     swing = held.period * held.clip.fps
-    blocks = int(held.frames[: held.until].sum() / swing) if np.isfinite(swing) else 0
-    if blocks >= LEAST_BLOCKS:
-        parts = [block.sum() for block in np.array_split(off.sum(0)[held.frames[: held.until]], blocks)]
+    swings = int(held.frames[: held.until].sum() / swing) if np.isfinite(swing) else 0
+    if swings >= LEAST_SWINGS:
+        parts = [part.sum() for part in np.array_split(off.sum(0)[held.frames[: held.until]], swings)]
     else:
         parts = off.sum(1)[held.seen.any(1)]
-    drawn = np.random.default_rng(0).choice(parts, (DRAWS, len(parts))).sum(1)
-    return bool(np.quantile(drawn, DOUBT / max(tried, 1)) > 0)
+    if np.ptp(parts) == 0:
+        return bool(parts[0] > 0)
+    return bool(ttest_1samp(parts, 0.0, alternative="greater").pvalue < DOUBT / max(tried, 1))
 
 
 def best_of_each(tried: list[Tried]) -> list[Tried]:
