@@ -12,7 +12,7 @@ from surgisim.phantom.families import bodies, stepping
 from surgisim.phantom.families import seen as seeing_of
 from surgisim.phantom.families.blind import concealed, invent, recording
 from surgisim.phantom.families.hidden import KINDS, described
-from surgisim.phantom.families.oracle import evidence
+from surgisim.phantom.families.oracle import UNKNOWN, Oracle
 from surgisim.phantom.families.solvers import solver
 from surgisim.phantom.families.solvers.lattice import Lattice
 from surgisim.phantom.families.solvers.springs import Springs
@@ -230,18 +230,43 @@ def test_worlds_differ_in_everything_and_an_axis_tells_nothing_of_another():
     assert other.material != worlds[0].material
 
 
-def test_evidence_is_the_chi_square_of_what_nothing_else_explains():
+def test_an_oracle_sees_what_nothing_else_explains_and_no_more_points_than_err_apart():
     rng = np.random.default_rng(6)
-    rest, seen = rng.standard_normal((20, 3)), np.ones((20, 30), bool)
-    seeing = dataclasses.replace(seeing_of.draw(rng), sigma=1e-4, lasting=0.0, camera="still")
+    rest, seen = 0.02 * rng.standard_normal((20, 3)), rng.uniform(size=(20, 30)) < 0.9
+    seeing = dataclasses.replace(
+        seeing_of.draw(rng), sigma=1e-4, lasting=0.0, shared=0.0, offset=0.0, camera="still"
+    )
     base = [rng.standard_normal((20, 30, 3)) for _ in range(2)]
-    assert evidence(2e-4 * base[0], base, rest, seen, seeing) == pytest.approx(0, abs=1e-12)
-    assert evidence(np.full((20, 30, 3), 3e-4), base, rest, seen, seeing) == pytest.approx(0, abs=1e-12)
+    plain = Oracle(rest, seen, seeing, base)
+    assert plain.evidence(2e-4 * base[0]) == pytest.approx(0, abs=1e-4)
     d = 1e-4 * rng.standard_normal((20, 30, 3))
-    assert evidence(d, base, rest, seen, seeing) == pytest.approx(0.5 * 3 * 20 * 29, rel=0.06)
-    moved = np.cross(np.broadcast_to(rng.standard_normal((1, 30, 3)), d.shape), (rest - rest.mean(0))[:, None])
-    shaken = dataclasses.replace(seeing, camera="walk")
-    assert evidence(1e-4 * moved, base, rest, seen, shaken) == pytest.approx(0, abs=1e-9)
+    assert plain.evidence(d) == pytest.approx(0.5 * 3 * (seen.sum() - 20), rel=0.06)
+    # The same for all points, as neighbours err that see as one; with a short reach they are points apart.
+    common = np.broadcast_to(1e-4 * rng.standard_normal((1, 30, 3)), d.shape)
+    near, far = (
+        Oracle(rest, seen, dataclasses.replace(seeing, shared=0.5, reach=reach), []).evidence(common)
+        for reach in (1.0, 1e-3)
+    )
+    assert near < 0.12 * far
+    assert far == pytest.approx(plain.evidence(common), rel=0.1)
+
+
+@pytest.mark.parametrize("camera", seeing_of.CAMERAS)
+def test_an_oracle_knows_the_noise_that_is_drawn(camera):
+    world = block(frames=6)
+    world = dataclasses.replace(world, probes=world.probes[::3], weights=world.weights[::3])
+    seeing = dataclasses.replace(
+        seeing_of.draw(np.random.default_rng(3)), lasting=0.5, shared=0.4, reach=0.01, offset=0.7, swapped=0.0,
+        tails=np.inf, camera=camera, shake=0.6,
+    )  # fmt: skip
+    rng, true = np.random.default_rng(4), np.repeat(world.rest[:, None], 6, 1)
+    drawn = np.stack([seeing_of.observed(world, true, seeing, rng) - true for _ in range(3000)]) / seeing.sigma
+    oracle = Oracle(world.rest, np.ones(true.shape[:2], bool), seeing, [])
+    for _ in range(3):
+        d = np.cumsum(rng.standard_normal(true.shape), 1).ravel()
+        constant = (UNKNOWN - seeing.offset**2) * (d.reshape(true.shape).sum(1) ** 2).sum()
+        seen = (drawn.reshape(len(drawn), -1) @ d).var()
+        assert d @ oracle.covered(d) - constant == pytest.approx(seen, rel=0.12)
 
 
 def test_a_camera_that_stands_still_adds_noise_of_the_size_that_is_said():

@@ -15,7 +15,7 @@ from surgisim.phantom.families import hidden as hiding
 from surgisim.phantom.families import seen as seeing_of
 from surgisim.phantom.families import world as world_of
 from surgisim.phantom.families.hidden import KINDS, Hidden
-from surgisim.phantom.families.oracle import evidence
+from surgisim.phantom.families.oracle import Oracle
 from surgisim.phantom.families.solvers import Solver, solver
 from surgisim.phantom.families.world import World
 from surgisim.problem import Problem
@@ -25,6 +25,11 @@ DECK = ("nothing",) * 6 + ("outside",) * 4 + ("one",) * 10
 """Twenty cases in a row hold these, shuffled."""
 STRONG = (25.0, 800.0)
 """Log evidence that an oracle shall have of what is hidden; between them its logarithm is uniform."""
+OTHER_GRIPS = (
+    {"wider": 1.1}, {"later": 0.3}, {"sooner": 0.3}, *({"aside": tuple(by)} for by in 5e-4 * np.eye(3)),
+)  # fmt: skip
+"""As which an effect may not count: grips that are wider, open later, close sooner or hold beside where they are said
+to (`World.gripped`)."""
 TRIES = 7
 """Runs of the search for a magnitude."""
 PLACES = 4
@@ -104,8 +109,9 @@ def _hide(name, world, plain, engine, free, seeing, rng, say) -> tuple[np.ndarra
     stiffer = replace(law, E=1.25 * law.E, eta=1.25 * law.eta)
     other = stiffer, replace(law, nu=law.nu - 0.04), replace(law, eta=1.25 * law.eta)
     base = [engine.paths(world.of_material(m), ()) - plain for m in other]
+    base += [engine.paths(world.gripped(**how), ()) - plain for how in OTHER_GRIPS]
     base += [np.gradient(plain, axis=1), plain - plain[:, :1]]
-    base = [d[:, fitted] for d in base]
+    oracle = Oracle(world.rest, free[:, fitted], seeing, [d[:, fitted] for d in base])
     asked = math.exp(rng.uniform(*np.log(STRONG)))
     kind = KINDS[name]
     best: tuple[float, np.ndarray, Hidden, float] | None = None
@@ -120,7 +126,7 @@ def _hide(name, world, plain, engine, free, seeing, rng, say) -> tuple[np.ndarra
                 high = (math.log(magnitude), math.log(30 * asked))
             else:
                 change = (true - plain)[:, fitted]
-                surely = evidence(change, base, world.rest, free[:, fitted], seeing)
+                surely = oracle.evidence(change)
                 off = abs(math.log(max(surely, 1e-9) / asked))
                 if surely >= STRONG[0] and (best is None or off < best[0]):
                     best = off, true, hidden.scaled(magnitude), surely

@@ -8,6 +8,8 @@ import numpy as np
 from surgisim.phantom.families.world import World
 
 CAMERAS = ("still", "jitter", "drift", "walk")
+ARM = 0.025
+"""Where a camera's turn moves tissue as far as its shift does [m]."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +38,38 @@ class Seeing:
     shake: float
     """How far the camera goes, over sigma [1]."""
 
-    @property
-    def inflation(self) -> float:
-        """Of the variance of a mean over time, for what lasts [1]."""
-        rho = self.lasting * self.keep
-        return (1 + rho) / (1 - rho)
+    def between(self, rest: np.ndarray) -> np.ndarray:
+        """Correlation of what the tracker adds at points `rest` [m], (K, 3), (K, K) [1]."""
+        return (1 - self.shared) * np.eye(len(rest)) + self.shared * _near(rest, self.reach)
+
+    def over_time(self, frames: int) -> np.ndarray:
+        """The same of one point at all frames, (T, T) [1]."""
+        lag = np.abs(np.subtract.outer(np.arange(frames), np.arange(frames)))
+        return (1 - self.lasting) * np.eye(frames) + self.lasting * self.keep**lag
+
+    def courses(self, frames: int) -> np.ndarray:
+        """What the camera's six motions do over time, each a sum of these by independent unit normals, over sigma,
+        (T, C) [1]."""
+        if self.camera == "jitter":
+            found = np.eye(frames)
+        elif self.camera == "drift":
+            found = 2 * np.linspace(0, 1, frames)[:, None]
+        else:
+            found = 2 / math.sqrt(frames) * np.tri(frames) * (self.camera == "walk")
+        return self.shake * (found - found[:1])
+
+
+def _near(rest: np.ndarray, reach: float) -> np.ndarray:
+    away = np.linalg.norm(rest[:, None] - rest[None], axis=-1)
+    return np.exp(-0.5 * (away / reach) ** 2)
+
+
+def moves(points: np.ndarray, center: np.ndarray) -> np.ndarray:
+    """How the camera's six motions move points [m], (..., 3), of tissue about `center`, (6, ..., 3) [1]: three shifts,
+    and three turns, by as much as a shift at ARM."""
+    shifts = [np.broadcast_to(axis, points.shape) for axis in np.eye(3)]
+    turns = [np.cross(shift, points - center) / ARM for shift in shifts]
+    return np.stack([*shifts, *turns])
 
 
 def draw(rng: np.random.Generator) -> Seeing:
@@ -66,7 +95,7 @@ def observed(world: World, true: np.ndarray, seeing: Seeing, rng: np.random.Gene
     """What is recorded [m], (K, T, 3), of true paths."""
     rest, (points, frames) = world.rest, true.shape[:2]
     away = np.linalg.norm(rest[:, None] - rest[None], axis=-1)
-    mix = np.linalg.cholesky(np.exp(-0.5 * (away / seeing.reach) ** 2) + 1e-6 * np.eye(points))
+    mix = np.linalg.cholesky(_near(rest, seeing.reach) + 1e-6 * np.eye(points))
 
     def noise() -> np.ndarray:
         white = rng.standard_normal(true.shape)
@@ -87,24 +116,8 @@ def observed(world: World, true: np.ndarray, seeing: Seeing, rng: np.random.Gene
         begin = int(rng.integers(1, frames))
         end = min(begin + int(rng.integers(2, max(frames // 5, 3))), frames)
         told[[k, other], begin:end] = told[[other, k], begin:end]
-    return _moved(told, rest.mean(0), seeing, world.fps, rng)
-
-
-def _moved(points: np.ndarray, center: np.ndarray, seeing: Seeing, fps: float, rng: np.random.Generator) -> np.ndarray:
-    """As the camera sees them that does not stand still: shifted, and turned about the middle."""
-    frames = points.shape[1]
-    if seeing.camera == "still":
-        return points
-    time = np.arange(frames) / fps
-    if seeing.camera == "jitter":
-        course = rng.standard_normal((frames, 6))
-    elif seeing.camera == "drift":
-        course = np.outer(time / max(time[-1], 1e-9), 2 * rng.standard_normal(6))
-    else:
-        course = np.cumsum(rng.standard_normal((frames, 6)), 0) / math.sqrt(frames) * 2
-    course = seeing.shake * seeing.sigma * (course - course[0])
-    turn = course[:, 3:] / 0.025
-    return points + course[:, :3] + np.cross(np.broadcast_to(turn, points.shape), points - center)
+    courses = seeing.sigma * seeing.courses(frames)
+    return told + np.einsum("tm,mkti->kti", courses @ rng.standard_normal((courses.shape[1], 6)), moves(told, rest.mean(0)))
 
 
 def visible(world: World, plain: np.ndarray, seeing: Seeing, rng: np.random.Generator) -> np.ndarray:
