@@ -25,11 +25,8 @@ DECK = ("nothing",) * 6 + ("outside",) * 4 + ("one",) * 10
 """Twenty cases in a row hold these, shuffled."""
 STRONG = (25.0, 800.0)
 """Log evidence that an oracle shall have of what is hidden; between them its logarithm is uniform."""
-OTHER_GRIPS = (
-    {"wider": 1.1}, {"later": 0.3}, {"sooner": 0.3}, *({"aside": tuple(by)} for by in 5e-4 * np.eye(3)),
-)  # fmt: skip
-"""As which an effect may not count: grips that are wider, open later, close sooner or hold beside where they are said
-to (`World.gripped`)."""
+OTHER_GRIPS = ({"wider": 1.1}, {"later": 0.3}, {"sooner": 0.3})
+"""As which an effect may not count: grips that are wider, open later or close sooner (`World.gripped`)."""
 TRIES = 7
 """Runs of the search for a magnitude."""
 PLACES = 4

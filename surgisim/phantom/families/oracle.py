@@ -2,7 +2,7 @@
 
 The log evidence of a change d of the paths over nothing is half of d^T Q d: Q is the inverse of the covariance C of
 what tracker and camera add, without the directions that could as well be the base, the timing of tracker and grips, or
-where, how firmly and how widely they hold. C is the one that the noise was drawn with (seen.py): neighbours err alike, for
+how firmly and how widely they hold. C is the one that the noise was drawn with (seen.py): neighbours err alike, for
 some frames on end, and a camera moves all points, so that a hundred points say much less than a hundred times one. A
 ratio of RMS would not compare between points, frames and families.
 """

@@ -110,13 +110,11 @@ class World:
         """The same with pulls of this share of their length."""
         return replace(self, grips=tuple(replace(g, pull=share * g.pull, aside=share * g.aside) for g in self.grips))
 
-    def gripped(self, wider=1.0, later=0.0, sooner=0.0, aside=(0.0, 0.0, 0.0)) -> "World":
-        """The same with grips this many times as wide, which open later and close sooner by these shares of a frame and
-        hold tissue `aside` of where they did [m], (3,)."""
+    def gripped(self, wider: float = 1.0, later: float = 0.0, sooner: float = 0.0) -> "World":
+        """The same with grips this many times as wide, which open later and close sooner by these shares of a frame."""
 
         def other(g: Grip) -> Grip:
-            center = g.center + np.array(aside)
-            return replace(g, radius=wider * g.radius, late=g.late + later, early=g.early + sooner, center=center)
+            return replace(g, radius=wider * g.radius, late=g.late + later, early=g.early + sooner)
 
         return replace(self, grips=tuple(map(other, self.grips)))
 
