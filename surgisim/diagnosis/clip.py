@@ -27,8 +27,8 @@ SETTLES = 4
 """Frames after a release that are not taken as still."""
 QUIET = 1.6
 """Times the step of the quietest fifth of the frames, below which a frame counts as quiet where nothing is gripped."""
-MOST = 120
-"""Points that are used at most; neighbours' errors are alike, so more of them tell little more."""
+MOST = 240
+"""Points that are used at most: time and memory grow with them; chosen."""
 LEAST_SEEN = 0.2
 """Share of the fitted frames in which a point must be seen."""
 
@@ -167,6 +167,14 @@ class Clip:
         stiffer = self.stiffer if share is None else np.zeros(3)
         body = self.recording.body(float(spacing), raised)
         return replace(self.less(None), body=body, raised=raised, stiffer=stiffer)
+
+    @property
+    def untouched(self) -> int | None:
+        """First fitted frame in which something grips; None of a video's tracks (`noise.estimate`)."""
+        if self.recording.astray:
+            return None
+        held = self.held[: self.until]
+        return int(held.argmax()) if held.any() else self.until if len(self.motion.radius) else 0
 
     def quiet(self) -> np.ndarray:
         """Frames in which tissue is still or moves slowly: what the noise is read from, (T,) bool."""

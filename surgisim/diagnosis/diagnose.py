@@ -245,7 +245,10 @@ def prepare_case(
     """
     until = clip.until
     fitted = slice(0, until)
-    noise = estimate(clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, clip.quiet()[fitted], *clip.nominal)
+    noise = estimate(
+        clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, clip.quiet()[fitted], *clip.nominal,
+        untouched=clip.untouched,
+    )
     if clip.recording.astray:
         noise = by_frame(noise, clip.moved, clip.seen)
     if settings.noise == "independent":

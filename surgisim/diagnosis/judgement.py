@@ -417,7 +417,7 @@ def noise_beside(case: Case, after: np.ndarray) -> Noise:
     clip, quiet = case.clip, slice(0, case.clip.until)
     found = estimate(
         residual(case, after, False, whole=True)[:, quiet], clip.seen[:, quiet], clip.rest, clip.quiet()[quiet],
-        *clip.nominal,
+        *clip.nominal, untouched=clip.untouched,
     )  # fmt: skip
     return replace(found, rough=case.noise.rough)
 

@@ -9,7 +9,9 @@ the view. shared: c exp(-|x - x'|^2 / 2 l^2), in time rho^|t - t'|; camera: a co
 which shake from frame to frame, in time s^|t - t'|; lasting: a r^|t - t'|; white: b. The numbers are those of largest
 restricted likelihood on frames in which the tissue is still, each stretch less its own polynomial in time, so that what
 physics moves slowly is not counted as noise (Patterson and Thompson, Recovery of inter-block information when block
-sizes are unequal, Biometrika 58, 1971). Patterns over the points (constant, gradients, then the eigenvectors of what is
+sizes are unequal, Biometrika 58, 1971). Such polynomials hide noise that lasts, too, and what nothing tells is at its
+prior's middle. So less is taken off of frames in which nothing has touched the tissue yet: there it does not relax, and
+what moves each place otherwise than its surroundings is the tracker. Patterns over the points (constant, gradients, then the eigenvectors of what is
 shared) are each a time series of their own, which a Cholesky factor whitens.
 
 What is not seen has no value: every sample that is missing is a direction of infinite variance, and so is each point's
@@ -28,8 +30,9 @@ from surgisim.recordings.ways import told_of, turned
 
 MOST_POINTS, FEWER = 90, 45
 """Points whose covariance is fitted, and where samples are missing; all are whitened."""
-SLOW = 4
-"""Frames for each degree of the polynomial that is taken off a stretch."""
+SLOW, SLOW_AT_REST = 4, 16
+"""Frames for each degree of the polynomial that is taken off a stretch; of what neighbours do otherwise than all while
+nothing has touched the tissue yet."""
 STRETCH = 24
 """Frames of a stretch where no frames are known to be still."""
 SEEN = 0.6
@@ -225,35 +228,37 @@ def _lost(plain: Whitener, unseen: np.ndarray) -> np.ndarray:
 
 def estimate(
     moved: np.ndarray, seen: np.ndarray, rest: np.ndarray, still: np.ndarray, nominal: np.ndarray,
-    axes: np.ndarray | None = None, ways: np.ndarray | None = None,
+    axes: np.ndarray | None = None, ways: np.ndarray | None = None, untouched: int | None = None,
 ) -> Noise:  # fmt: skip
     """From displacements [m], (K, T, 3), where `seen`, (K, T), on frames that are `still`, (T,) bool.
 
     nominal: what the recording says of each point's noise [m], (K,); it decides where nothing can be estimated.
     axes: what it says of the three axes' shares of it [1], (K, 3), None if alike; ways: their directions, (K, 3, 3),
-    if not x, y and z.
+    if not x, y and z. untouched: first frame in which something grips; None where tracks are a video's, which go astray
+    with tissue that moves by itself.
     Missing samples of a stretch are drawn from what the seen ones leave open, and the numbers fitted again.
     """
     if axes is not None:
-        found = estimate(turned(moved, ways) / axes[:, None], seen, rest, still, nominal)
+        found = estimate(turned(moved, ways) / axes[:, None], seen, rest, still, nominal, untouched=untouched)
         return replace(found, axes=axes, ways=ways)
     level = np.maximum(_levels(moved, seen, nominal), 1e-9)
     rng = np.random.default_rng(0)
     most = MOST_POINTS if seen[:, still].all() else FEWER
     chosen = np.arange(len(rest)) if len(rest) <= most else np.sort(rng.permutation(len(rest))[:most])
     parts = []
-    for frames in _stretches(still):
+    for frames in _stretches(still, untouched or 0):
         mine = chosen[seen[np.ix_(chosen, frames)].mean(1) >= SEEN]
         if len(mine) >= 4:
-            parts.append(_Stretch.of(moved, seen, rest, level, mine, frames))
-    noise = Noise(level, **_unpacked(START))
+            parts.append(_Stretch.of(moved, seen, rest, level, mine, frames, frames[-1] < (untouched or 0)))
+    prior = PRIOR if untouched is None else MEASURED
+    noise = Noise(level, **_unpacked(prior[0]))
     if not parts:
         return noise
     gaps = any(not part.seen.all() for part in parts)
-    x = START
+    x = prior[0]
     for _ in range(FILLINGS if gaps else 1):
         filled = [part.filled(noise, rng) for part in parts]
-        x = _fitted(filled, x, MOST_RUNS)
+        x = _fitted(filled, x, MOST_RUNS, prior)
         noise = Noise(level, **_unpacked(x))
     return noise
 
@@ -289,20 +294,19 @@ class _Stretch:
     """(K, T, 3), of seen samples."""
     slow: np.ndarray
     """Polynomials in time, (T, B)."""
+    slow_here: np.ndarray
+    """Those of what neighbours do otherwise than all, (T, A)."""
 
     @classmethod
-    def of(cls, moved, seen, rest, level, mine, frames) -> "_Stretch":
-        slow = legvander(np.linspace(-1, 1, len(frames)), max(1, len(frames) // SLOW))
-        at = np.ix_(mine, frames)
-        return cls(rest[mine], seen[at], moved[at] / level[mine, None, None], slow)
+    def of(cls, moved, seen, rest, level, mine, frames, untouched) -> "_Stretch":
+        time, at = np.linspace(-1, 1, len(frames)), np.ix_(mine, frames)
+        slow, here = (legvander(time, max(1, len(frames) // each)) for each in (SLOW, SLOW_AT_REST))
+        return cls(rest[mine], seen[at], moved[at] / level[mine, None, None], slow, here if untouched else slow)
 
-    def filled(self, noise: Noise, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points, contrasts that no polynomial changes, (T, C), and the values' contrasts, (K, C, 3)."""
-        value = self.value
-        if not self.seen.all():
-            value = self._completed(noise, rng)
-        basis = np.linalg.qr(self.slow, mode="complete")[0][:, self.slow.shape[1] :]
-        return self.rest, basis, np.einsum("ts,ktc->ksc", basis, value)
+    def filled(self, noise: Noise, rng: np.random.Generator) -> "_Filled":
+        value = self._completed(noise, rng) if not self.seen.all() else self.value
+        forms = _quadratic(self.rest).shape[1]
+        return _Filled(self.rest, forms, (_contrasts(self.slow), _contrasts(self.slow_here)), value)
 
     def _completed(self, noise: Noise, rng: np.random.Generator) -> np.ndarray:
         """Values with those that are missing drawn from what the seen ones leave open (kriging with a trend)."""
@@ -310,7 +314,7 @@ class _Stretch:
         cov = np.einsum("km,mts,lm->ktls", axes, noise.temporal(len(self.slow), shared, camera), axes, optimize=True)
         size = self.seen.size
         # A trend of each point, as uncertain as anything that moves slowly.
-        trend = 30.0**2 * self.slow @ self.slow.T
+        trend = 30.0**2 * self.slow_here @ self.slow_here.T
         cov = cov.reshape(size, size) + np.kron(np.eye(len(self.rest)), trend)
         there, gone = np.flatnonzero(self.seen), np.flatnonzero(~self.seen)
         factor = cho_factor(cov[np.ix_(there, there)])
@@ -323,30 +327,66 @@ class _Stretch:
         return flat.reshape(self.value.shape)
 
 
-def _fitted(data: list, x: np.ndarray, most: int) -> np.ndarray:
-    """Numbers of largest restricted likelihood, from x."""
+@dataclass(frozen=True)
+class _Filled:
+    """The same with every sample there."""
 
-    def cost(x: np.ndarray) -> float:
-        part = _unpacked(x)
-        total = 0.5 * float(((x - START) ** 2 / SPREAD**2).sum())
-        for where, basis, z in data:
-            axes, shared, camera = _modes(where, part["shared"], part["length"], part["rigid"], part["tilt"])
-            keeps = (part[name] for name in ("keep_shared", "keep_rigid", "lasting", "keep", "white"))
-            cov = basis.T @ _temporal(np.arange(len(basis)), shared, camera, *keeps) @ basis
+    rest: np.ndarray
+    forms: int
+    """How many of the modes are quadratic forms of place."""
+    parts: tuple[np.ndarray, np.ndarray]
+    """Contrasts in time that no polynomial changes of those modes and of all others, (T, C)."""
+    value: np.ndarray
+
+    def cost(self, part: dict[str, float]) -> float:
+        """Minus the logarithm of the restricted likelihood."""
+        axes, shared, camera = _modes(
+            self.rest, part["shared"], part["length"], part["rigid"], part["tilt"], self.forms
+        )
+        keeps, total = [part[name] for name in ("keep_shared", "keep_rigid", "lasting", "keep", "white")], 0.0
+        for mine, basis in zip((slice(0, self.forms), slice(self.forms, None)), self.parts, strict=True):
+            cov = basis.T @ _temporal(np.arange(len(basis)), shared[mine], camera[mine], *keeps) @ basis
             factor = np.linalg.cholesky(cov)
-            mode = np.einsum("km,ksc->msc", axes, z)
+            mode = np.einsum("km,ts,ktc->msc", axes[:, mine], basis, self.value, optimize=True)
             white = np.linalg.solve(factor, mode)
             total += 0.5 * float((white**2).sum()) + 3 * float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum())
         return total
 
+
+def _contrasts(slow: np.ndarray) -> np.ndarray:
+    return np.linalg.qr(slow, mode="complete")[0][:, slow.shape[1] :]
+
+
+def _quadratic(rest: np.ndarray) -> np.ndarray:
+    """Orthonormal quadratic forms of place, (K, Q), which span the camera's patterns too."""
+    arm = (rest - rest.mean(0)) / max(float(np.ptp(rest, axis=0).max()), 1e-9)
+    both = [arm[:, i] * arm[:, j] for i in range(3) for j in range(i, 3)]
+    left, size, _ = np.linalg.svd(np.column_stack([np.ones(len(rest)), arm, *both]), full_matrices=False)
+    return left[:, size > 1e-6 * size.max()]
+
+
+def _fitted(data: list[_Filled], x: np.ndarray, most: int, prior: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Numbers of largest restricted likelihood, times the prior's, from x."""
+
+    def cost(x: np.ndarray) -> float:
+        part = _unpacked(x)
+        return 0.5 * float((((x - prior[0]) / prior[1]) ** 2).sum()) + sum(each.cost(part) for each in data)
+
     return minimize(cost, x, method="L-BFGS-B", options={"maxfun": most, "ftol": 1e-7, "eps": 1e-4}).x
 
 
-START = np.array([-1.2, np.log(0.006), -3.0, -3.0, 1.0, 0.0, -1.2, 1.0, -0.8])
-SPREAD = np.array([1.5, 0.6, 1.5, 1.5, 1.0, 1.0, 1.5, 1.0, 1.5])
-"""Of the prior on: log shared, log length [m], log rigid, log tilt, logit rho, logit s, log lasting, logit r,
-log white.
+PRIOR = (
+    np.array([-1.2, np.log(0.006), -3.0, -3.0, 1.0, 0.0, -1.2, 1.0, -0.8]),
+    np.array([1.5, 0.6, 1.5, 1.5, 1.0, 1.0, 1.5, 1.0, 1.5]),
+)
+"""Middle and spread of: log shared, log length [m], log rigid, log tilt, logit rho, logit s, log lasting, logit r, log
+white.
 Wide: a factor of four and more either way, correlations of .3 to .9; what no still frames tell is at its middle."""
+MEASURED = (
+    np.array([-2.5, np.log(0.006), -3.0, -3.0, 1.0, 0.0, -2.5, 1.0, -0.8]),
+    np.array([2.5, 0.6, 2.5, 2.5, 1.0, 1.0, 2.5, 1.0, 1.5]),
+)
+"""The same of what markers or another kept tracker measure: noise may well be white."""
 
 
 def _unpacked(x: np.ndarray) -> dict[str, float]:
@@ -357,7 +397,8 @@ def _unpacked(x: np.ndarray) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _modes(rest, shared, length, rigid, tilt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _modes(rest, shared, length, rigid, tilt, forms: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """forms: where not 0, the first so many modes span the quadratic forms of place."""
     away = ((rest[:, None] - rest[None]) ** 2).sum(-1)
     kernel = shared * np.exp(-0.5 * away / length**2)
     arm = rest - rest.mean(0)
@@ -366,11 +407,16 @@ def _modes(rest, shared, length, rigid, tilt) -> tuple[np.ndarray, np.ndarray, n
     size = size**2 * (size > 1e-6 * size.max())
     whole = np.concatenate([np.full((len(rest), 1), len(rest) ** -0.5), left[:, size > 0]], 1)
     # What neighbours share splits into the camera's patterns and the rest; how the two are related is left out.
-    basis = np.linalg.qr(whole, mode="complete")[0]
-    beyond = basis[:, whole.shape[1] :]
-    values, vectors = np.linalg.eigh(beyond.T @ kernel @ beyond)
-    axes = np.concatenate([whole, beyond @ vectors], 1)
-    shares = np.concatenate([np.einsum("km,kl,lm->m", whole, kernel, whole, optimize=True), values])
+    basis = np.linalg.qr(whole, mode="complete")[0][:, whole.shape[1] :]
+    if forms:
+        # Those beside the camera's patterns, which are forms too, come first.
+        basis = basis @ np.linalg.svd(basis.T @ _quadratic(rest))[0]
+    axes, shares = [whole], [np.einsum("km,kl,lm->m", whole, kernel, whole, optimize=True)]
+    for beyond in np.split(basis, [max(forms - whole.shape[1], 0)], axis=1):
+        values, vectors = np.linalg.eigh(beyond.T @ kernel @ beyond)
+        axes.append(beyond @ vectors)
+        shares.append(values)
+    axes, shares = np.concatenate(axes, 1), np.concatenate(shares)
     camera = np.zeros(len(rest))
     camera[: whole.shape[1]] = np.concatenate([[rigid * len(rest)], tilt * size[size > 0] / reach])
     return axes, np.maximum(shares, 0), camera
@@ -398,9 +444,11 @@ def _levels(moved, seen, nominal) -> np.ndarray:
     return unit * share
 
 
-def _stretches(still: np.ndarray) -> list[np.ndarray]:
+def _stretches(still: np.ndarray, touched: int) -> list[np.ndarray]:
+    """Successive frames, of which none holds the first frame that is touched beside others before it."""
     frames = np.flatnonzero(still)
-    parts = [p for p in np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1) if len(p) >= 6]
+    apart = (np.diff(frames) > 1) | ((frames[:-1] < touched) & (frames[1:] >= touched))
+    parts = [p for p in np.split(frames, np.flatnonzero(apart) + 1) if len(p) >= 6]
     if not parts:
         parts = np.array_split(np.arange(len(still)), max(1, len(still) // STRETCH))
     return [q for p in parts for q in np.array_split(p, max(1, len(p) // (2 * STRETCH)))]
