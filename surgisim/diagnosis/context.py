@@ -10,7 +10,7 @@ from surgisim.diagnosis import calibration, nuisance
 from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
-from surgisim.diagnosis.metric import Metric, metric
+from surgisim.diagnosis.metric import Metric, metric, products
 from surgisim.diagnosis.noise import Noise, Whitener
 from surgisim.diagnosis.nuisance import Group, positions, release, span
 from surgisim.diagnosis.perceived import OF_TRACKS
@@ -88,8 +88,8 @@ class Case:
 
     @cached_property
     def _products(self) -> tuple[np.ndarray, np.ndarray]:
-        U = self.space.columns
-        return (U.T @ U).astype(float), self.space.seen_through(self.z)
+        # Of a camera that may go a hundred times as far, rounding to single precision is more than what noise leaves.
+        return products(self.space.columns), self.space.seen_through(self.z)
 
     def open_by(self, name: str, times: float | np.ndarray) -> "Case":
         """The same with the prior of one kind of nuisance some times as wide, or of each of its directions, (C,)."""

@@ -61,6 +61,11 @@ def metric(columns: np.ndarray) -> Metric:
         factor = cho_factor(one + (U.T @ U).astype(float))
     except LinAlgError:
         # Columns so large and so alike that their products, rounded to single precision, are those of no columns.
-        rows = np.array_split(U, len(U) // ROWS + 1)
-        factor = cho_factor(one + sum(part.T.astype(float) @ part.astype(float) for part in rows))
+        factor = cho_factor(one + products(U))
     return Metric(U, factor)
+
+
+def products(columns: np.ndarray) -> np.ndarray:
+    """Of columns, (N, M) float32, with each other in double precision, (M, M)."""
+    rows = np.array_split(columns, len(columns) // ROWS + 1)
+    return sum(part.T.astype(float) @ part.astype(float) for part in rows)
