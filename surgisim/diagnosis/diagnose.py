@@ -246,7 +246,11 @@ def prepare_case(
     until = clip.until
     fitted = slice(0, until)
     noise = estimate(
-        clip.moved[:, fitted], clip.seen[:, fitted], clip.rest, clip.quiet()[fitted], *clip.nominal,
+        clip.moved[:, fitted],
+        clip.seen[:, fitted],
+        clip.rest,
+        clip.quiet()[fitted],
+        *clip.nominal,
         untouched=clip.untouched,
     )
     if clip.recording.astray:

@@ -11,8 +11,8 @@ restricted likelihood on frames in which the tissue is still, each stretch less 
 physics moves slowly is not counted as noise (Patterson and Thompson, Recovery of inter-block information when block
 sizes are unequal, Biometrika 58, 1971). Such polynomials hide noise that lasts, too, and what nothing tells is at its
 prior's middle. So less is taken off of frames in which nothing has touched the tissue yet: there it does not relax, and
-what moves each place otherwise than its surroundings is the tracker. Patterns over the points (constant, gradients, then the eigenvectors of what is
-shared) are each a time series of their own, which a Cholesky factor whitens.
+what moves each place otherwise than its surroundings is the tracker. Patterns over the points (constant, gradients,
+then the eigenvectors of what is shared) are each a time series of their own, which a Cholesky factor whitens.
 
 What is not seen has no value: every sample that is missing is a direction of infinite variance, and so is each point's
 constant. Projecting those out of the whitened vectors is the exact marginal likelihood of the samples that are there.

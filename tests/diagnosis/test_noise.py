@@ -33,6 +33,48 @@ def test_the_noise_that_was_drawn_is_found(drawn):
     assert (white**2).sum() / freedom == pytest.approx(1.0, abs=0.1)
 
 
+def told_from(noise, rest, signal):
+    return float((whitener(noise, rest, np.ones(signal.shape[:2], bool))(signal) ** 2).sum())
+
+
+@pytest.fixture(scope="module")
+def white():
+    """Points that err on their own, and what would show over one half of them in the last third of the frames."""
+    rng = np.random.default_rng(9)
+    rest = np.append(rng.uniform(0, 0.04, (60, 2)), np.zeros((60, 1)), 1)
+    bump = np.exp(-0.5 * ((rest - rest[0]) ** 2).sum(1) / 0.012**2)
+    signal = bump[:, None, None] * np.clip((np.arange(FRAMES) - 50) / 20, 0, 1)[:, None] * np.array([0, 0, 1e-4])
+    return rest, 2e-4 * rng.standard_normal((60, FRAMES, 3)), signal
+
+
+def told(white, moved=0.0, untouched=None):
+    rest, tracks, _ = white
+    still = np.ones(FRAMES, bool)
+    return estimate(tracks + moved, np.ones((60, FRAMES), bool), rest, still, np.full(60, 2e-4), untouched=untouched)
+
+
+def test_frames_that_nothing_has_touched_tell_white_noise_from_noise_that_lasts(white):
+    rest, _, signal = white
+    true = Noise(
+        level=np.full(60, 2e-4), **NOISE | {"shared": 0.0, "rigid": 0.0, "tilt": 0.0, "lasting": 0.0, "white": 1.0}
+    )
+    most = told_from(true, rest, signal)
+    moving, resting = (told_from(told(white, untouched=frames), rest, signal) / most for frames in (0, 50))
+    assert moving < resting
+    assert 0.4 < resting < 1.1
+
+
+def test_what_breathes_before_anything_is_touched_is_no_noise(white):
+    rest, *_ = white
+    arm = (rest - rest.mean(0)) / 0.02
+    breath = (1 + 0.5 * arm[:, 0] - 0.4 * arm[:, 1] ** 2)[:, None] * 1e-3 * np.sin(np.arange(FRAMES) / 6)
+    still, breathing = told(white, untouched=FRAMES), told(white, breath[..., None] * AXES, untouched=FRAMES)
+    assert breathing.sigma == pytest.approx(still.sigma, rel=0.1)
+    # Of one place it is: there nobody could tell it from a tracker that wanders.
+    here = np.exp(-0.5 * arm[:, 0] ** 2 / 0.3**2)[:, None] * 1e-3 * np.sin(np.arange(FRAMES) / 6)
+    assert told(white, here[..., None] * AXES, untouched=FRAMES).sigma > 1.2 * still.sigma
+
+
 AXES = np.sqrt([0.15, 0.15, 2.7])
 
 

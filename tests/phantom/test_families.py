@@ -233,9 +233,7 @@ def test_worlds_differ_in_everything_and_an_axis_tells_nothing_of_another():
 def test_an_oracle_sees_what_nothing_else_explains_and_no_more_points_than_err_apart():
     rng = np.random.default_rng(6)
     rest, seen = 0.02 * rng.standard_normal((20, 3)), rng.uniform(size=(20, 30)) < 0.9
-    seeing = dataclasses.replace(
-        seeing_of.draw(rng), sigma=1e-4, lasting=0.0, shared=0.0, offset=0.0, camera="still"
-    )
+    seeing = dataclasses.replace(seeing_of.draw(rng), sigma=1e-4, lasting=0.0, shared=0.0, offset=0.0, camera="still")
     base = [rng.standard_normal((20, 30, 3)) for _ in range(2)]
     plain = Oracle(rest, seen, seeing, base)
     assert plain.evidence(2e-4 * base[0]) == pytest.approx(0, abs=1e-4)

@@ -117,7 +117,9 @@ def observed(world: World, true: np.ndarray, seeing: Seeing, rng: np.random.Gene
         end = min(begin + int(rng.integers(2, max(frames // 5, 3))), frames)
         told[[k, other], begin:end] = told[[other, k], begin:end]
     courses = seeing.sigma * seeing.courses(frames)
-    return told + np.einsum("tm,mkti->kti", courses @ rng.standard_normal((courses.shape[1], 6)), moves(told, rest.mean(0)))
+    return told + np.einsum(
+        "tm,mkti->kti", courses @ rng.standard_normal((courses.shape[1], 6)), moves(told, rest.mean(0))
+    )
 
 
 def visible(world: World, plain: np.ndarray, seeing: Seeing, rng: np.random.Generator) -> np.ndarray:
