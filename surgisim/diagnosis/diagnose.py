@@ -115,6 +115,7 @@ def compete(case: Case, laws: Scores, ranked: list[str], progress: Progress) -> 
         refits.sort(key=lambda r: -r.log_evidence)
     progress(0.74, 1, f"other laws where {refits[0].term} acts")
     refits = gathered(case, laws, refits)
+    refits += unheard(case, laws, ranked, refits, progress)
     close = [r for r in refits if r.gain > calibration.CLOSE * refits[0].gain]
     close = close[: min(settings.free, int(settings.budget / fit_of_a_law(case)))]
     for n, one in enumerate(close):
@@ -122,6 +123,18 @@ def compete(case: Case, laws: Scores, ranked: list[str], progress: Progress) -> 
         better = freed(case, one, case.z, lambda text, done=done: progress(done, 1, text))
         refits = [better if r is one else r for r in refits]
     return case, sorted(refits, key=lambda r: -r.log_evidence)
+
+
+def unheard(case: Case, laws: Scores, ranked: list[str], refits: list[Refit], progress: Progress) -> list[Refit]:
+    """All other laws as the engine runs them once, where only the frames held out may tell: which of them foretells
+    those is not known from what it does in frames that say nothing clear of any."""
+    if case.prospect is None or refits[0].log_evidence >= calibration.CLEAR:
+        return []
+    known = {r.term for r in refits}
+    others = [t for t in ranked if t not in known and laws[t].best.gain > calibration.SOME]
+    progress(0.73, 1, f"frames held out with {', '.join(others)}")
+    fine = [sharpened(case, laws[term], case.z) for term in others]
+    return at_once(lambda one, _: refit(case, *one, case.z, rounds=1), fine, case.workers)
 
 
 def gathered(case: Case, laws: Scores, refits: list[Refit]) -> list[Refit]:
