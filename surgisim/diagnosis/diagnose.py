@@ -126,9 +126,12 @@ def compete(case: Case, laws: Scores, ranked: list[str], progress: Progress) -> 
 
 
 def unheard(case: Case, laws: Scores, ranked: list[str], refits: list[Refit], progress: Progress) -> list[Refit]:
-    """All other laws as the engine runs them once, where only the frames held out may tell: which of them foretells
-    those is not known from what it does in frames that say nothing clear of any."""
-    if case.prospect is None or refits[0].log_evidence >= calibration.CLEAR:
+    """All other laws as the engine runs them once, where only the frames held out may tell: where the fitted ones say
+    nothing clear of any, or the best of them is refuted. What a law foretells is not known from what it does there."""
+    if case.prospect is None:
+        return []
+    ahead = case.prospect.gain(case.base.simulated, case.base.simulated + refits[0].response)
+    if refits[0].log_evidence >= calibration.CLEAR and not ahead.refuted:
         return []
     known = {r.term for r in refits}
     others = [t for t in ranked if t not in known and laws[t].best.gain > calibration.SOME]
