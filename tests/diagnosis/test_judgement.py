@@ -187,6 +187,10 @@ def test_a_law_is_not_named_for_little():
     assert reason(explanation(evidence=CLEAR - 1), borne=0.5 * BORNE_OUT) == "faint"
     assert reason(explanation(evidence=CLEAR + 1), borne=0.5 * BORNE_OUT) == "unbacked"
     assert reason(explanation(evidence=CLEAR - 1), borne=0.5 * BORNE_OUT, case=UNCALIBRATED) == "named"
+    # Where the fitted frames' plain error bears out some of it, that of those held out may bear out the rest.
+    falling = replace(explanation(evidence=CLEAR + 1), falls=True)
+    assert reason(falling, borne=0.5 * BORNE_OUT) == "named"
+    assert reason(falling, borne=-0.1) == "unbacked"
 
 
 def test_what_leaves_frames_held_out_far_off_is_not_named():
