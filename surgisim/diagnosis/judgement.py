@@ -278,7 +278,7 @@ def _reason(
     """Why it is named, or not; held: its probability among all laws, with those that it may be instead."""
     free = not case.settings.calibrated
     clear = free or chosen.log_evidence >= calibration.CLEAR
-    # Beside a camera that walks the plain error of the fitted frames tells little; that of those held out may tell more.
+    # Beside a camera that walks the fitted frames' plain error tells little; that of those held out may tell more.
     seen = free or borne >= calibration.BORNE_OUT or (borne > 0 and chosen.falls and chosen.confirmed)
     # What the plain error does not bear out and is contradicted by frames held out is not certain to be anything.
     certain = case.overstretched or (clear and (seen or chosen.support >= calibration.CLEAR))
