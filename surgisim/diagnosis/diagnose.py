@@ -127,15 +127,16 @@ def compete(case: Case, laws: Scores, ranked: list[str], progress: Progress) -> 
 
 def unheard(case: Case, laws: Scores, ranked: list[str], refits: list[Refit], progress: Progress) -> list[Refit]:
     """All other laws as the engine runs them once, where only the frames held out may tell: where the fitted ones say
-    nothing clear of any, or the best of them is refuted. What a law foretells is not known from what it does there."""
-    if case.prospect is None:
+    nothing clear of any, or the best of them is refuted. What a law foretells is not known from what it does there.
+    None of a video, whose guessed body is off by more than that."""
+    if case.prospect is None or judgement.guessed(case):
         return []
     ahead = case.prospect.gain(case.base.simulated, case.base.simulated + refits[0].response)
     if refits[0].log_evidence >= calibration.CLEAR and not ahead.refuted:
         return []
     known = {r.term for r in refits}
     others = [t for t in ranked if t not in known and laws[t].best.gain > calibration.SOME]
-    progress(0.73, 1, f"frames held out with {', '.join(others)}")
+    progress(0.745, 1, f"frames held out with {', '.join(others)}")
     fine = [sharpened(case, laws[term], case.z) for term in others]
     return at_once(lambda one, _: refit(case, *one, case.z, rounds=1), fine, case.workers)
 
