@@ -93,6 +93,13 @@ class Explanation:
         )
 
     @property
+    def foretold(self) -> bool:
+        """Whether fitted frames leave no doubt and those held out gain by it about what it promises: then a plain
+        error, of which a camera that walks is most, need not fall as far."""
+        sure = self.log_evidence >= calibration.CERTAIN and self.ahead is not None and self.ahead.confirmed
+        return sure and self.ahead.value >= calibration.HALF * self.ahead.expected
+
+    @property
     def visible(self) -> bool:
         return self.ahead is not None and self.ahead.visible
 
@@ -278,8 +285,7 @@ def _reason(
     """Why it is named, or not; held: its probability among all laws, with those that it may be instead."""
     free = not case.settings.calibrated
     clear = free or chosen.log_evidence >= calibration.CLEAR
-    # Beside a camera that walks the fitted frames' plain error tells little; that of those held out may tell more.
-    seen = free or borne >= calibration.BORNE_OUT or (borne > 0 and chosen.falls and chosen.confirmed)
+    seen = free or borne >= calibration.BORNE_OUT or (borne > 0 and chosen.foretold)
     # What the plain error does not bear out and is contradicted by frames held out is not certain to be anything.
     certain = case.overstretched or (clear and (seen or chosen.support >= calibration.CLEAR))
     if not certain and not seen:

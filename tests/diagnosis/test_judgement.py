@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from surgisim.diagnosis import judgement
-from surgisim.diagnosis.calibration import BORNE_OUT, CLEAR, PULLS, PUSH_LEAVES, THRESHOLD
+from surgisim.diagnosis.calibration import BORNE_OUT, CERTAIN, CLEAR, PULLS, PUSH_LEAVES, THRESHOLD
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint
@@ -187,10 +187,17 @@ def test_a_law_is_not_named_for_little():
     assert reason(explanation(evidence=CLEAR - 1), borne=0.5 * BORNE_OUT) == "faint"
     assert reason(explanation(evidence=CLEAR + 1), borne=0.5 * BORNE_OUT) == "unbacked"
     assert reason(explanation(evidence=CLEAR - 1), borne=0.5 * BORNE_OUT, case=UNCALIBRATED) == "named"
-    # Where the fitted frames' plain error bears out some of it, that of those held out may bear out the rest.
-    falling = replace(explanation(evidence=CLEAR + 1), falls=True)
-    assert reason(falling, borne=0.5 * BORNE_OUT) == "named"
-    assert reason(falling, borne=-0.1) == "unbacked"
+
+
+def test_a_law_beyond_doubt_that_foretells_as_much_as_it_promises_need_not_be_borne_out_so_far():
+    def said(borne: float, **changed) -> str:
+        return reason(explanation(**{"evidence": CERTAIN, "ahead": BETTER} | changed), borne=borne)
+
+    assert said(0.5 * BORNE_OUT) == "named"
+    assert said(-0.1) == "unbacked"
+    assert said(0.5 * BORNE_OUT, evidence=CERTAIN - 1) == "unbacked"
+    assert said(0.5 * BORNE_OUT, ahead=replace(BETTER, expected=3 * BETTER.value)) == "unbacked"
+    assert said(0.5 * BORNE_OUT, ahead=BLIND) == "unbacked"
 
 
 def test_what_leaves_frames_held_out_far_off_is_not_named():
