@@ -56,6 +56,7 @@ def test_no_replay_on_a_grid_that_is_not_finer(case, named):
     assert replayed(replace(case, settings=Diagnosing(grid=GRID, replay=GRID)), named, None) is None
 
 
+@pytest.mark.slow(100)
 def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_finer_grid(monkeypatch):
     settings = Diagnosing(grid=GRID, replay=0.21, nulls=8, experiment=False, free=0, second=False, refine=1)
     first_look, looked, said, made = diagnosing.first_look, [], [], recording()
