@@ -136,6 +136,8 @@ def unheard(case: Case, laws: Scores, ranked: list[str], refits: list[Refit], pr
         return []
     known = {r.term for r in refits}
     others = [t for t in ranked if t not in known and laws[t].best.gain > calibration.SOME]
+    if not others:
+        return []
     progress(0.745, 1, f"frames held out with {', '.join(others)}")
     fine = [sharpened(case, laws[term], case.z) for term in others]
     return at_once(lambda one, _: refit(case, *one, case.z, rounds=1), fine, case.workers)

@@ -102,13 +102,14 @@ def _borne(world: World, engine: Solver) -> tuple[World, np.ndarray]:
 
 def _hide(name, world, plain, engine, free, seeing, rng, say) -> tuple[np.ndarray, Hidden, float]:
     """Paths with it [m], what it is, and the log evidence that an oracle has of it."""
-    law, fitted = world.material, slice(0, world.split)
+    law, fitted = world.material, np.arange(world.frames) < world.split
     stiffer = replace(law, E=1.25 * law.E, eta=1.25 * law.eta)
     other = stiffer, replace(law, nu=law.nu - 0.04), replace(law, eta=1.25 * law.eta)
     base = [engine.paths(world.of_material(m), ()) - plain for m in other]
     base += [engine.paths(world.gripped(**how), ()) - plain for how in OTHER_GRIPS]
     base += [np.gradient(plain, axis=1), plain - plain[:, :1]]
-    oracle = Oracle(world.rest, free[:, fitted], seeing, [d[:, fitted] for d in base])
+    # A camera goes its way over all frames, so that the noise of those that may be fitted is a part of all frames'.
+    oracle = Oracle(world.rest, free & fitted, seeing, base)
     asked = math.exp(rng.uniform(*np.log(STRONG)))
     kind = KINDS[name]
     best: tuple[float, np.ndarray, Hidden, float] | None = None
@@ -122,8 +123,7 @@ def _hide(name, world, plain, engine, free, seeing, rng, say) -> tuple[np.ndarra
             except Problem:
                 high = (math.log(magnitude), math.log(30 * asked))
             else:
-                change = (true - plain)[:, fitted]
-                surely = oracle.evidence(change)
+                surely = oracle.evidence(true - plain)
                 off = abs(math.log(max(surely, 1e-9) / asked))
                 if surely >= STRONG[0] and (best is None or off < best[0]):
                     best = off, true, hidden.scaled(magnitude), surely

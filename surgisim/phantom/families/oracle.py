@@ -20,7 +20,8 @@ UNKNOWN = 100.0
 
 
 class Oracle:
-    """For points at `rest` [m], (K, 3), seen where `seen`, (K, T), beside directions `base` [m], each (K, T, 3)."""
+    """For points at `rest` [m], (K, 3), over a whole clip, in samples `seen`, (K, T), that may be fitted, beside
+    directions `base` [m], each (K, T, 3)."""
 
     def __init__(self, rest: np.ndarray, seen: np.ndarray, seeing: Seeing, base: list[np.ndarray]):
         self._seen, self._sigma = seen, seeing.sigma
