@@ -8,7 +8,7 @@ from surgisim.config.base import Settings
 
 Kinds = Literal[
     "release", "held", "lag", "scale", "drift", "place", "simulator", "grip radius", "grip centre", "grip firmness",
-    "grip path", "elastic law", "closing", "perception", "shape", "swing", "edge", "astray", "jumps",
+    "uneven grip", "grip path", "elastic law", "closing", "perception", "shape", "swing", "edge", "astray", "jumps",
 ]  # fmt: skip
 """What a recording leaves open, by name."""
 

@@ -61,8 +61,8 @@ class Explanation:
 
     @property
     def enough(self) -> bool:
-        """Whether its evidence suffices to name it."""
-        return self.support >= calibration.THRESHOLD
+        """Whether its evidence suffices to name it: that of the fitted frames, to which those held out add."""
+        return self.log_evidence >= calibration.TRIED and self.support >= calibration.THRESHOLD
 
     @property
     def loose(self) -> bool:

@@ -12,16 +12,15 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from surgisim.config.diagnosis import Diagnosing
-from surgisim.diagnosis import perceived
+from surgisim.diagnosis import gripping, perceived
 from surgisim.diagnosis.base import HELD, Base, by_held, displacement_gradient, tracks_of
 from surgisim.diagnosis.clip import Clip
-from surgisim.diagnosis.form import hats, knots, plane
+from surgisim.diagnosis.form import plane
 from surgisim.diagnosis.group import Group
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.noise import Noise, whitener
 from surgisim.diagnosis.ring_down import LATE, LATEST
 from surgisim.estimation.trial import at_once
-from surgisim.mpm.grip import runs
 from surgisim.mpm.setup import widened
 from surgisim.mpm.simulator import Breakdown
 from surgisim.problem import Problem
@@ -50,11 +49,8 @@ PLACE, SLIGHT, MOST_PLACES = 1.0, 1.0, 150
 """Where a point sits on the body, over the noise of a frame: what a tracker has constantly wrong, no averaging takes
 off, and a mesh moves each point a little otherwise than tissue does. Directions are left out where a standard deviation
 is worth less chi square than SLIGHT, and beyond the first MOST_PLACES."""
-FIRM = 0.15
-"""Of how much more or less than all of its path a grip carries along [1]."""
-RADIUS, HERE, CENTRE, PATH = 0.1, 1.0, 5e-4, 1e-4
-"""Of a grip's radius, and again of all grips' alike [1]; of a factor of that which varies over the tissue [1]; of a
-grip's centre [m], and of its path from moment to moment [m]."""
+RADIUS, CENTRE = 0.1, 5e-4
+"""Of a grip's radius, and again of all grips' alike [1]; of a grip's centre [m]."""
 SOON = 0.2
 """Of the moment of a release whose frames were fitted, about what came out [frames]: there tracks bend with it."""
 LAWS = ("corotated", "neo_hookean")
@@ -95,7 +91,7 @@ def of_laws(
     others: `other_bodies` near this base.
     """
     near = base.tangent
-    groups = [*others, firmness(clip, near), path(clip, near), closing(clip, near), perceived.edge(clip, near)]
+    groups = [*others, *gripping.groups(clip, near), perceived.edge(clip, near)]
     gradient = displacement_gradient(base.prepared, clip, base.run)
     error = np.zeros_like(base.simulated) if clip.error is None else clip.error
     return of_base(clip, base.simulated, error, gradient, drift, noise, settings) + chosen(groups, settings)
@@ -274,8 +270,8 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
     for j in np.flatnonzero(motion.active.any(1) & ~motion.active[:, : clip.until].any(1)):
         # Of grips that fitted frames show, the tangent says it (`firmness`).
         way = np.eye(len(motion.radius))[j][:, None, None] * (motion.position - motion.center_rest[:, None])
-        further = replace(motion, position=motion.position + FIRM * way)
-        trials.append(("grip firmness", (f"firmness of grip {j}", FIRM, "1"), further, 1.0))
+        further = replace(motion, position=motion.position + gripping.FIRM * way)
+        trials.append(("grip firmness", (f"firmness of grip {j}", gripping.FIRM, "1"), further, 1.0))
     trials = [
         (name, told, replace(clip, recording=replace(clip.recording, motion=m)), None, times)
         for name, told, m, times in trials
@@ -302,7 +298,7 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
             before = groups.get(name, Group(name, np.zeros((0, *change.shape))))
             groups[name] = Group(name, np.concatenate([before.columns, change[None]]), (*before.values, told))
     if "grip radius" in groups:
-        groups["grip radius"] = _of_one_instrument(_not_a_ball(clip, groups["grip radius"]))
+        groups["grip radius"] = _of_one_instrument(groups["grip radius"])
     held = HELD * by_held(clip, base.x, base.simulated, memo)
     if held.any():
         groups["held"] = Group("held", held[None], (("where what is held ends", HELD, "m"),))
@@ -314,17 +310,6 @@ def release(grip: int, last: int) -> str:
     return f"release of grip {grip} after frame {last}"
 
 
-def _not_a_ball(clip: Clip, radius: Group) -> Group:
-    """Grips larger here and smaller there: what a grip holds ends where no grid, mesh or jaw says exactly."""
-    (alike, patterns), columns = _factors(clip), [radius.columns]
-    shown = {f"radius of grip {j}" for j, on in enumerate(clip.motion.active) if on[: clip.until].any()}
-    for one, (name, *_) in zip(radius.columns, radius.values, strict=True):
-        if name in shown:
-            columns.append(HERE * one * patterns[:, :, None, None])
-            columns.append(np.stack(_askew(HERE / ASKEW / 2 * one, [np.ones(clip.frames, bool)], alike, patterns)))
-    return replace(radius, columns=np.concatenate(columns))
-
-
 def _of_one_instrument(radius: Group) -> Group:
     """Grips that are all larger, or all smaller, than said: the same jaws, measured or meshed the same way."""
     if len(radius.values) < 2:
@@ -332,65 +317,3 @@ def _of_one_instrument(radius: Group) -> Group:
     each = [RADIUS / sd * one for one, (_, sd, _) in zip(radius.columns, radius.values, strict=False)]
     # Last, since `values` names the first columns.
     return replace(radius, columns=np.concatenate([radius.columns, sum(each)[None]]))
-
-
-def firmness(clip: Clip, near) -> Group:
-    """How firmly a gripped ball is carried along.
-
-    A ball that is a little larger or smaller than it should be carries its surroundings by a constant share more or
-    less; slipping, which begins at some moment, is not of that form.
-    """
-    result, frames = [], clip.until
-    for j in range(len(clip.motion.radius)):
-        active = clip.motion.active[j, :frames]
-        if not active.any():
-            continue
-        way = np.where(active[:, None], clip.motion.position[j, :frames] - clip.motion.center_rest[j], 0.0)
-        parts = _carried(clip, near, j)
-        whole = np.einsum("dkti,td->kti", parts, way)
-        reach = np.linalg.norm(way, axis=1)
-        share = reach / max(reach.max(), 1e-9)
-        result += [FIRM * whole, FIRM / 2 * whole * (2 * share - 1)[None, :, None]]
-        result += [FIRM / 2 * parts[d] * reach[None, :, None] for d in range(3)]
-    return Group("grip firmness", _to_the_end(result, clip))
-
-
-def path(clip: Clip, near) -> Group:
-    """Where a grip carries tissue, from moment to moment."""
-    result = []
-    for j in range(len(clip.motion.radius)):
-        active = clip.motion.active[j, : clip.until]
-        if active.any():
-            parts = _carried(clip, near, j)
-            courses = [bump * active for bump in hats(knots(clip), clip) if (bump * active).any()]
-            result += [PATH * parts[d] * course[None, :, None] for course in courses for d in range(3)]
-    return Group("grip path", _to_the_end(result, clip))
-
-
-def closing(clip: Clip, near) -> Group:
-    """Grips that close sooner or later than their first frame: what they carry is ahead or behind by that much path."""
-    result, values = [], []
-    for j, on in enumerate(clip.motion.active[:, : clip.until]):
-        parts = _carried(clip, near, j) if on.any() else None
-        for first, last in runs(on):
-            step = clip.motion.position[j, min(first + 1, last)] - clip.motion.position[j, first]
-            if step.any():
-                holds = (np.arange(clip.until) >= first) & (np.arange(clip.until) <= last)
-                result.append(LATE * np.einsum("dkti,d->kti", parts, step) * holds[None, :, None])
-                values.append((f"closing of grip {j} at frame {first}", LATE / clip.fps, "s"))
-    return Group("closing", _to_the_end(result, clip), tuple(values))
-
-
-def _carried(clip: Clip, near, j: int) -> np.ndarray:
-    """Displacement of the points by a shift of grip j along each axis, frame by frame [1], (3, K, T_fit, 3)."""
-    loads = near.anchored(1 + j).T
-    states = near.at_states(np.broadcast_to(loads, (len(near.frames), *loads.shape)))
-    return np.stack([near.over_time(states[:, d], np.ones(clip.until)) for d in range(3)])
-
-
-def _to_the_end(columns: list[np.ndarray], clip: Clip) -> np.ndarray:
-    """Columns over the fitted frames, with nothing after them, (C, K, T, 3)."""
-    whole = np.zeros((len(columns), len(clip.kept), clip.frames, 3))
-    for n, column in enumerate(columns):
-        whole[n, :, : clip.until] = column
-    return whole

@@ -83,10 +83,12 @@ class Tangent:
             total[mine] += self.share[mine, s, None] * (force[mine] @ answer.T)
         return total.reshape(len(force), -1, 3).swapaxes(0, 1)
 
-    def anchored(self, anchor: int) -> np.ndarray:
-        """Forces [N], (3 A, 3), by a shift of an anchor by one metre along each axis."""
+    def anchored(self, anchor: int, field: np.ndarray | None = None) -> np.ndarray:
+        """Forces [N], (3 A, 3), by a shift of an anchor by one metre along each axis, or of each particle that it holds
+        by `field` metres, (P,)."""
         simulator, drive = self.prepared.simulator, self.drive
         member = ((drive.member >> anchor) & 1).astype(float) * drive.share * simulator.volume_p
+        member = member if field is None else member * field
         spring = drive.stiffness[anchor] * simulator.density
         push = member[:, None, None] * spring[None]
         return self.value.T @ push.reshape(-1, 3)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from surgisim.diagnosis import judgement
-from surgisim.diagnosis.calibration import BORNE_OUT, CERTAIN, CLEAR, PULLS, PUSH_LEAVES, THRESHOLD
+from surgisim.diagnosis.calibration import BORNE_OUT, CERTAIN, CLEAR, PULLS, PUSH_LEAVES, THRESHOLD, TRIED
 from surgisim.diagnosis.evidence import Finding
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint
@@ -198,6 +198,12 @@ def test_a_law_beyond_doubt_that_foretells_as_much_as_it_promises_need_not_be_bo
     assert said(0.5 * BORNE_OUT, evidence=CERTAIN - 1) == "unbacked"
     assert said(0.5 * BORNE_OUT, ahead=replace(BETTER, expected=3 * BETTER.value)) == "unbacked"
     assert said(0.5 * BORNE_OUT, ahead=BLIND) == "unbacked"
+
+
+def test_what_only_frames_held_out_speak_for_is_not_named():
+    much = Gain(60.0, 2.0, 110.0, 60.0)
+    assert reason(explanation(evidence=TRIED - 1, ahead=much)) == "faint"
+    assert reason(explanation(evidence=TRIED + 1, ahead=much)) == "named"
 
 
 def test_what_leaves_frames_held_out_far_off_is_not_named():

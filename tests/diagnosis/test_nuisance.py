@@ -27,7 +27,7 @@ from surgisim.diagnosis.self_consistency import drawn
 
 NAMES = (
     "release", "held", "lag", "scale", "drift", "place", "simulator", "grip radius", "grip centre", "grip firmness",
-    "grip path", "elastic law", "closing",
+    "uneven grip", "grip path", "elastic law", "closing",
 )  # fmt: skip
 DIRECTIONS, DRAWS = 300, 12
 

@@ -10,7 +10,7 @@ import pytest
 from surgisim.config.invent import FAMILIES, Invent
 from surgisim.phantom.families import bodies, stepping
 from surgisim.phantom.families import seen as seeing_of
-from surgisim.phantom.families.blind import concealed, invent, recording
+from surgisim.phantom.families.blind import concealed, invent, left_open, recording
 from surgisim.phantom.families.hidden import KINDS, described
 from surgisim.phantom.families.oracle import UNKNOWN, Oracle
 from surgisim.phantom.families.solvers import solver
@@ -247,6 +247,21 @@ def test_an_oracle_sees_what_nothing_else_explains_and_no_more_points_than_err_a
     )
     assert near < 0.12 * far
     assert far == pytest.approx(plain.evidence(common), rel=0.1)
+
+
+def test_what_another_grip_would_do_is_nothing_to_an_oracle():
+    world, engine, rng = block(), solver("springs"), np.random.default_rng(9)
+    world = dataclasses.replace(world, grips=(grip(world),))
+    plain = engine.paths(world, ())
+    open_too = left_open(world, plain, engine)
+    # Three numbers of the base, three grips, a lag and a scale; springs and pads, where this grip carries its points.
+    assert len(open_too) == 3 + 3 + 2 + 2
+    seeing = dataclasses.replace(seeing_of.draw(rng), sigma=2e-5, camera="still")
+    seen = np.ones(plain.shape[:2], bool)
+    pads = engine.paths(world.gripped(handling="pads"), ()) - plain
+    alone, beside = (Oracle(world.rest, seen, seeing, base).evidence(pads) for base in ([], open_too))
+    assert alone > 1
+    assert beside < 1e-3 * alone
 
 
 @pytest.mark.parametrize("camera", seeing_of.CAMERAS)

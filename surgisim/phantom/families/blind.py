@@ -17,7 +17,7 @@ from surgisim.phantom.families import world as world_of
 from surgisim.phantom.families.hidden import KINDS, Hidden
 from surgisim.phantom.families.oracle import Oracle
 from surgisim.phantom.families.solvers import Solver, solver
-from surgisim.phantom.families.world import World
+from surgisim.phantom.families.world import HANDLING, World
 from surgisim.problem import Problem
 
 Progress = Callable[[float, float, str], None]
@@ -25,8 +25,9 @@ DECK = ("nothing",) * 6 + ("outside",) * 4 + ("one",) * 10
 """Twenty cases in a row hold these, shuffled."""
 STRONG = (25.0, 800.0)
 """Log evidence that an oracle shall have of what is hidden; between them its logarithm is uniform."""
-OTHER_GRIPS = ({"wider": 1.1}, {"later": 0.3}, {"sooner": 0.3})
-"""As which an effect may not count: grips that are wider, open later or close sooner (`World.gripped`)."""
+OTHER_GRIPS = ({"wider": 1.1}, {"later": 0.3}, {"sooner": 0.3}, *({"handling": way} for way in HANDLING))
+"""As which an effect may not count: grips that are wider, open later, close sooner or take tissue along otherwise
+(`World.gripped`), none of which a recording tells."""
 TRIES = 7
 """Runs of the search for a magnitude."""
 PLACES = 4
@@ -102,12 +103,7 @@ def _borne(world: World, engine: Solver) -> tuple[World, np.ndarray]:
 
 def _hide(name, world, plain, engine, free, seeing, rng, say) -> tuple[np.ndarray, Hidden, float]:
     """Paths with it [m], what it is, and the log evidence that an oracle has of it."""
-    law, fitted = world.material, np.arange(world.frames) < world.split
-    stiffer = replace(law, E=1.25 * law.E, eta=1.25 * law.eta)
-    other = stiffer, replace(law, nu=law.nu - 0.04), replace(law, eta=1.25 * law.eta)
-    base = [engine.paths(world.of_material(m), ()) - plain for m in other]
-    base += [engine.paths(world.gripped(**how), ()) - plain for how in OTHER_GRIPS]
-    base += [np.gradient(plain, axis=1), plain - plain[:, :1]]
+    base, fitted = left_open(world, plain, engine), np.arange(world.frames) < world.split
     # A camera goes its way over all frames, so that the noise of those that may be fitted is a part of all frames'.
     oracle = Oracle(world.rest, free & fitted, seeing, base)
     asked = math.exp(rng.uniform(*np.log(STRONG)))
@@ -137,6 +133,17 @@ def _hide(name, world, plain, engine, free, seeing, rng, say) -> tuple[np.ndarra
     raise Problem(
         f"phantom: {name}: no oracle would see it in this body at a magnitude that tissue bears. Take another case."
     )
+
+
+def left_open(world: World, plain: np.ndarray, engine: Solver) -> list[np.ndarray]:
+    """Changes of the plain paths [m], (K, T, 3) each, as which what is hidden may not count: another modulus, Poisson's
+    ratio and viscosity, other grips, a lag of the tracker and another scale."""
+    law = world.material
+    stiffer = replace(law, E=1.25 * law.E, eta=1.25 * law.eta)
+    others = [world.of_material(m) for m in (stiffer, replace(law, nu=law.nu - 0.04), replace(law, eta=1.25 * law.eta))]
+    others += [other for how in OTHER_GRIPS if (other := world.gripped(**how)).grips != world.grips]
+    moved = [engine.paths(other, ()) - plain for other in others]
+    return [*moved, np.gradient(plain, axis=1), plain - plain[:, :1]]
 
 
 def _next(low, high, goal: float) -> float:

@@ -110,11 +110,15 @@ class World:
         """The same with pulls of this share of their length."""
         return replace(self, grips=tuple(replace(g, pull=share * g.pull, aside=share * g.aside) for g in self.grips))
 
-    def gripped(self, wider: float = 1.0, later: float = 0.0, sooner: float = 0.0) -> "World":
-        """The same with grips this many times as wide, which open later and close sooner by these shares of a frame."""
+    def gripped(
+        self, wider: float = 1.0, later: float = 0.0, sooner: float = 0.0, handling: str | None = None
+    ) -> "World":
+        """The same with grips this many times as wide, which open later and close sooner by these shares of a frame,
+        and take tissue along in another way, one of HANDLING."""
 
         def other(g: Grip) -> Grip:
-            return replace(g, radius=wider * g.radius, late=g.late + later, early=g.early + sooner)
+            how = handling or g.handling
+            return replace(g, radius=wider * g.radius, late=g.late + later, early=g.early + sooner, handling=how)
 
         return replace(self, grips=tuple(map(other, self.grips)))
 
