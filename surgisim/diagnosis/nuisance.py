@@ -49,8 +49,9 @@ PLACE, SLIGHT, MOST_PLACES = 1.0, 1.0, 150
 """Where a point sits on the body, over the noise of a frame: what a tracker has constantly wrong, no averaging takes
 off, and a mesh moves each point a little otherwise than tissue does. Directions are left out where a standard deviation
 is worth less chi square than SLIGHT, and beyond the first MOST_PLACES."""
-RADIUS, CENTRE = 0.1, 5e-4
-"""Of a grip's radius, and again of all grips' alike [1]; of a grip's centre [m]."""
+RADIUS, HERE, CENTRE = 0.1, 1.0, 5e-4
+"""Of a grip's radius, and again of all grips' alike [1]; of a factor of that which varies over the tissue [1]; of a
+grip's centre [m]."""
 SOON = 0.2
 """Of the moment of a release whose frames were fitted, about what came out [frames]: there tracks bend with it."""
 LAWS = ("corotated", "neo_hookean")
@@ -298,7 +299,7 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
             before = groups.get(name, Group(name, np.zeros((0, *change.shape))))
             groups[name] = Group(name, np.concatenate([before.columns, change[None]]), (*before.values, told))
     if "grip radius" in groups:
-        groups["grip radius"] = _of_one_instrument(groups["grip radius"])
+        groups["grip radius"] = _of_one_instrument(_here_and_there(clip, groups["grip radius"]))
     held = HELD * by_held(clip, base.x, base.simulated, memo)
     if held.any():
         groups["held"] = Group("held", held[None], (("where what is held ends", HELD, "m"),))
@@ -308,6 +309,18 @@ def other_bodies(clip: Clip, base: Base, memo: Memo, workers: int) -> list[Group
 def release(grip: int, last: int) -> str:
     """What the moment is called at which a grip opens, after the last frame in which it holds."""
     return f"release of grip {grip} after frame {last}"
+
+
+def _here_and_there(clip: Clip, radius: Group) -> Group:
+    """Grips larger here and smaller there, which moves tissue farther here than there: no tissue is as uniform, nor any
+    mesh of it, as a base."""
+    (alike, patterns), columns = _factors(clip), [radius.columns]
+    shown = {f"radius of grip {j}" for j, on in enumerate(clip.motion.active) if on[: clip.until].any()}
+    for one, (name, *_) in zip(radius.columns, radius.values, strict=True):
+        if name in shown:
+            columns.append(HERE * one * patterns[:, :, None, None])
+            columns.append(np.stack(_askew(HERE / ASKEW / 2 * one, [np.ones(clip.frames, bool)], alike, patterns)))
+    return replace(radius, columns=np.concatenate(columns))
 
 
 def _of_one_instrument(radius: Group) -> Group:

@@ -53,7 +53,9 @@ def test_deep_inside_nothing_is_said():
 
 @pytest.mark.slow(80)
 def test_what_draws_tissue_outward_is_not_called_a_contact():
-    settings = Diagnosing(grid=GRID, replay=GRID, nulls=8, experiment=False, free=0, second=False, refine=1)
+    settings = Diagnosing(
+        grid=GRID, replay=GRID, nulls=8, experiment=False, free=0, second=False, refine=1, residual=False
+    )
     push = {"hidden_contact": {"force": 0.12, "yaw": 0.3, "pitch": 0.2, "onset": 0.7, "end": 1.4}}
     planted = recording(push, {"hidden_contact": BLOB})
     drawn, physics, _ = diagnose(planted, settings, lambda *_: None, memo_of(planted))

@@ -56,9 +56,11 @@ def test_no_replay_on_a_grid_that_is_not_finer(case, named):
     assert replayed(replace(case, settings=Diagnosing(grid=GRID, replay=GRID)), named, None) is None
 
 
-@pytest.mark.slow(100)
+@pytest.mark.slow(40)
 def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_finer_grid(monkeypatch):
-    settings = Diagnosing(grid=GRID, replay=0.21, nulls=8, experiment=False, free=0, second=False, refine=1)
+    settings = Diagnosing(
+        grid=GRID, replay=0.21, nulls=8, experiment=False, free=0, second=False, refine=1, residual=False
+    )
     first_look, looked, said, made = diagnosing.first_look, [], [], recording()
 
     def look(recording, chosen, memo, progress):
@@ -70,6 +72,7 @@ def test_what_strains_the_nuisances_and_no_law_says_clearly_is_looked_at_on_a_fi
 
     monkeypatch.setattr(calibration, "OVERSTRETCHED", 0.0)
     monkeypatch.setattr(diagnosing, "first_look", look)
+    monkeypatch.setattr(diagnosing, "unheard", lambda *_: [])
     diagnosing.diagnose(made, settings, lambda share, _, text: said.append((share, text)), memo_of(made))
     (coarse, about), (fine, about_finer) = looked
     assert (coarse, fine) == (GRID, 0.21)

@@ -8,6 +8,7 @@ from planted import GRID, TILT, memo_of, plain, recording, tilted
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, judgement
+from surgisim.diagnosis import diagnose as diagnosing
 from surgisim.diagnosis import verdict as judging
 from surgisim.diagnosis.calibration import CLEAR, THRESHOLD
 from surgisim.diagnosis.diagnose import diagnose, refit
@@ -89,6 +90,7 @@ def test_nuisances_larger_than_they_ever_are_are_something_hidden(bare, monkeypa
         assert pushed.overstretched == strained
         assert not replace(pushed, settings=SETTINGS.model_copy(update={"calibrated": False})).overstretched
     monkeypatch.setattr(calibration, "OVERSTRETCHED", 0.0)
+    monkeypatch.setattr(diagnosing, "unheard", lambda *_: [])
     # Recorded on the grid that runs are compared with: the coarse one's own error is not tissue's.
     settings = SETTINGS.model_copy(update={"refine": 1, "second": False})
     said, physics, _ = verdict(settings, share=FINER * GRID)
