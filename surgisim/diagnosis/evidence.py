@@ -22,6 +22,8 @@ from surgisim.diagnosis.metric import Metric
 
 SIZES = (1.5e-4, 4e-4, 1e-3)
 """RMS length of what an effect does to the points, beforehand [m]."""
+ROUNDED = 0.01
+"""Chi square below zero beyond which products of signatures, which are never negative, lost too much to rounding [1]."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,10 @@ def judge(block: Block, whiten, space: Metric, cleared: np.ndarray, source: int,
     # Whitening is done in single precision, which what stiffens exponentially leaves where tissue is stretched far.
     size = np.sqrt(np.maximum(np.diag(plain), 1e-60))
     white = whiten((block.columns / size[:, None, None, None]).astype(np.float32)).T
-    gram = space.gram(white, white) * size[:, None] * size
+    gram = space.gram(white, white)
+    if SIZES[-1] ** 2 * np.linalg.eigvalsh(gram)[0] < -ROUNDED:
+        gram = space.exactly(white)
+    gram = gram * size[:, None] * size
     shadow = (white.T @ cleared).astype(float) * size[:, None]
     return [weigh(h, gram, shadow, plain, source) for h in block.hypotheses]
 
