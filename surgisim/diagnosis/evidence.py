@@ -23,7 +23,7 @@ from surgisim.diagnosis.metric import Metric
 SIZES = (1.5e-4, 4e-4, 1e-3)
 """RMS length of what an effect does to the points, beforehand [m]."""
 ROUNDED = 0.01
-"""Chi square below zero beyond which products of signatures, which are never negative, lost too much to rounding [1]."""
+"""Chi square below zero beyond which products of signatures, never negative, lost too much to rounding [1]."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from surgisim.diagnosis.evidence import by_law, judge, weigh
+from surgisim.diagnosis.evidence import SIZES, by_law, judge, weigh
 from surgisim.diagnosis.form import Block
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.metric import metric
@@ -60,14 +60,14 @@ def test_the_many_places_of_one_scope_do_not_dilute_another(parts):
 
 def test_what_nuisances_take_all_but_wholly_is_weighed_without_rounding(parts):
     rng, _ = parts
-    points, frames, noise = 40, 25, 1e-4
+    points, frames, noise = 40, 25, 5e-6
     white = lambda fields: (fields / np.float32(noise)).reshape(len(fields), -1)  # noqa: E731
     open_too = rng.standard_normal((6, points, frames, 3)).astype(np.float32)
     space = metric(white(open_too).T)
     taken = np.einsum("cs,sktj->cktj", rng.standard_normal((4, 6)), open_too)
-    assert np.linalg.eigvalsh(space.gram(white(taken).T, white(taken).T))[0] < -10.0
-    exact = space.exactly(white(taken).T)
-    assert np.linalg.eigvalsh(exact)[0] > -0.01
+    rounded, exact = (SIZES[-1] ** 2 * by(white(taken).T) for by in (lambda a: space.gram(a, a), space.exactly))
+    assert np.linalg.eigvalsh(rounded)[0] < -0.1
+    assert np.linalg.eigvalsh(exact)[0] > -1e-3
     block = Block(taken.astype(float), [Hypothesis("taken", np.eye(4), 0), Hypothesis("one", np.eye(4)[:, :1], 1)])
     residual = space.cleared(rng.standard_normal((points * frames * 3, 2)).astype(np.float32))
     for f in judge(block, white, space, residual, 0, np.ones((points, frames), bool)):
