@@ -70,6 +70,8 @@ def test_what_nuisances_take_all_but_wholly_is_weighed_without_rounding(parts):
     assert np.linalg.eigvalsh(exact)[0] > -1e-3
     block = Block(taken.astype(float), [Hypothesis("taken", np.eye(4), 0), Hypothesis("one", np.eye(4)[:, :1], 1)])
     residual = space.cleared(rng.standard_normal((points * frames * 3, 2)).astype(np.float32))
-    for f in judge(block, white, space, residual, 0, np.ones((points, frames), bool)):
+    with np.errstate(invalid="raise"):
+        found = judge(block, white, space, residual, 0, np.ones((points, frames), bool))
+    for f in found:
         assert np.isfinite([f.log_evidence, *f.nulls, *f.spread]).all()
         assert (f.spread > 0).all()
