@@ -170,7 +170,7 @@ class Clip:
 
     @property
     def untouched(self) -> int | None:
-        """First fitted frame in which something grips; None of a video's tracks (`noise.estimate`)."""
+        """First fitted frame in which something grips; None of a video's tracks (`noise_fit.estimate`)."""
         if self.recording.astray:
             return None
         held = self.held[: self.until]

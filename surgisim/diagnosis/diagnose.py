@@ -20,7 +20,8 @@ from surgisim.diagnosis.joint import Joint, fit_jointly, needed
 from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import metric
-from surgisim.diagnosis.noise import Whitener, by_frame, estimate, whitener
+from surgisim.diagnosis.noise import Whitener, whitener
+from surgisim.diagnosis.noise_fit import by_frame, estimate
 from surgisim.diagnosis.nuisance import Group
 from surgisim.diagnosis.refit import Refit, fit_of_a_law, freed, refit
 from surgisim.diagnosis.search import search, sharpened, threshold

@@ -18,7 +18,8 @@ from surgisim.diagnosis.errors import as_filmed, bootstrap, noise_floor, residua
 from surgisim.diagnosis.evidence import Scores, best
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint, least, prediction
-from surgisim.diagnosis.noise import Noise, estimate
+from surgisim.diagnosis.noise import Noise
+from surgisim.diagnosis.noise_fit import estimate
 from surgisim.diagnosis.prospect import Gain
 from surgisim.diagnosis.refit import Refit, kept
 from surgisim.diagnosis.saturated import SmoothFit

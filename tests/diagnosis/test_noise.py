@@ -8,7 +8,8 @@ import pytest
 from planted import NOISE
 
 from surgisim.diagnosis.metric import metric
-from surgisim.diagnosis.noise import Noise, by_frame, estimate, whitener
+from surgisim.diagnosis.noise import Noise, whitener
+from surgisim.diagnosis.noise_fit import by_frame, estimate
 
 FRAMES = 80
 
