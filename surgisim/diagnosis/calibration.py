@@ -7,8 +7,8 @@ are one generator's numbers, our own phantom's. What a nuisance may be is none o
 
 TRIED = 5.0
 """log evidence of the fitted frames from which the engine runs the best laws, and below which none is named; chosen:
-half of THRESHOLD, so that frames held out may add as much. Of a dozen laws that are asked what they foretell of those,
-one or two seem confirmed where nothing is hidden (families' opened recordings)."""
+half of THRESHOLD, so that frames held out may add as much. Where all laws are asked what they foretell of those, two
+or three seem confirmed though nothing is hidden (two opened recordings of families)."""
 THRESHOLD = 10.0
 """log evidence of all frames, those held out as a prediction, below which nothing is called detectable: in the fitted
 ones six recordings of boards 22112611 and 22112612 (opened) that conceal nothing reach -1 to 6."""

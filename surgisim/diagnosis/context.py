@@ -89,7 +89,7 @@ class Case:
     @cached_property
     def _products(self) -> tuple[np.ndarray, np.ndarray]:
         # Of a camera that may go a hundred times as far, rounding to single precision is more than what noise leaves.
-        return products(self.space.columns), self.space.seen_through(self.z)
+        return products(self.space.columns, self.space.columns), self.space.seen_through(self.z)
 
     def open_by(self, name: str, times: float | np.ndarray) -> "Case":
         """The same with the prior of one kind of nuisance some times as wide, or of each of its directions, (C,)."""

@@ -52,7 +52,7 @@ def judge(block: Block, whiten, space: Metric, cleared: np.ndarray, source: int,
     white = whiten((block.columns / size[:, None, None, None]).astype(np.float32)).T
     gram = space.gram(white, white)
     if SIZES[-1] ** 2 * np.linalg.eigvalsh(gram)[0] < -ROUNDED:
-        gram = space.exactly(white)
+        gram = space.exact_gram(white)
     gram = gram * size[:, None] * size
     shadow = (white.T @ cleared).astype(float) * size[:, None]
     return [weigh(h, gram, shadow, plain, source) for h in block.hypotheses]

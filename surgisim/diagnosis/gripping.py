@@ -56,8 +56,7 @@ def unevenness(clip: Clip, near: Tangent) -> Group:
     for j, way in _ways(clip):
         reach = np.linalg.norm(way, axis=1)
         off = ((rest - clip.motion.center_rest[j]) / wide[j]).T
-        orders = [off, [a * b for a, b in combinations_with_replacement(off, 2)]]
-        for field in (one for order in orders for one in order):
+        for field in (*off, *(a * b for a, b in combinations_with_replacement(off, 2))):
             result += list(UNEVEN * _carried(clip, near, j, field) * reach[None, None, :, None])
     return Group("uneven grip", _to_the_end(result, clip))
 

@@ -36,18 +36,14 @@ class Metric:
         mine = self.seen_through(a)
         return plain - mine.T @ cho_solve(self.factor, mine if b is a else self.seen_through(b))
 
-    def exactly(self, a: np.ndarray) -> np.ndarray:
+    def exact_gram(self, a: np.ndarray) -> np.ndarray:
         """`gram` of columns (N, C) with each other in double precision, of what the directions take all but wholly."""
-        rows = len(a) // ROWS + 1
-        mine = sum(
-            u.T.astype(float) @ part.astype(float)
-            for u, part in zip(np.array_split(self.columns, rows), np.array_split(a, rows), strict=True)
-        )
-        return products(a) - mine.T @ cho_solve(self._exact_factor, mine)
+        mine = products(self.columns, a)
+        return products(a, a) - mine.T @ cho_solve(self._exact_factor, mine)
 
     @cached_property
     def _exact_factor(self) -> tuple:
-        return cho_factor(np.eye(self.columns.shape[1]) + products(self.columns))
+        return cho_factor(np.eye(self.columns.shape[1]) + products(self.columns, self.columns))
 
     def cleared(self, vectors: np.ndarray) -> np.ndarray:
         """(1 + U U^T)^-1 of vectors (N, C), float32: their plain products with others are those of `gram`."""
@@ -75,11 +71,12 @@ def metric(columns: np.ndarray) -> Metric:
         factor = cho_factor(one + (U.T @ U).astype(float))
     except LinAlgError:
         # Columns so large and so alike that their products, rounded to single precision, are those of no columns.
-        factor = cho_factor(one + products(U))
+        factor = cho_factor(one + products(U, U))
     return Metric(U, factor)
 
 
-def products(columns: np.ndarray) -> np.ndarray:
-    """Of columns, (N, M) float32, with each other in double precision, (M, M)."""
-    rows = np.array_split(columns, len(columns) // ROWS + 1)
-    return sum(part.T.astype(float) @ part.astype(float) for part in rows)
+def products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Of columns (N, C) and (N, D), float32, with each other in double precision, (C, D)."""
+    rows = len(a) // ROWS + 1
+    parts = zip(np.array_split(a, rows), np.array_split(b, rows), strict=True)
+    return sum(one.T.astype(float) @ other.astype(float) for one, other in parts)

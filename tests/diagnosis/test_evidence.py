@@ -65,7 +65,7 @@ def test_what_nuisances_take_all_but_wholly_is_weighed_without_rounding(parts):
     open_too = rng.standard_normal((6, points, frames, 3)).astype(np.float32)
     space = metric(white(open_too).T)
     taken = np.einsum("cs,sktj->cktj", rng.standard_normal((4, 6)), open_too)
-    rounded, exact = (SIZES[-1] ** 2 * by(white(taken).T) for by in (lambda a: space.gram(a, a), space.exactly))
+    rounded, exact = (SIZES[-1] ** 2 * by(white(taken).T) for by in (lambda a: space.gram(a, a), space.exact_gram))
     assert np.linalg.eigvalsh(rounded)[0] < -0.1
     assert np.linalg.eigvalsh(exact)[0] > -1e-3
     block = Block(taken.astype(float), [Hypothesis("taken", np.eye(4), 0), Hypothesis("one", np.eye(4)[:, :1], 1)])

@@ -25,9 +25,8 @@ DECK = ("nothing",) * 6 + ("outside",) * 4 + ("one",) * 10
 """Twenty cases in a row hold these, shuffled."""
 STRONG = (25.0, 800.0)
 """Log evidence that an oracle shall have of what is hidden; between them its logarithm is uniform."""
-OTHER_GRIPS = ({"wider": 1.1}, {"later": 0.3}, {"sooner": 0.3}, *({"handling": way} for way in HANDLING))
-"""As which an effect may not count: grips that are wider, open later, close sooner or take tissue along otherwise
-(`World.gripped`), none of which a recording tells."""
+OTHER_GRIPS = ({"wider": 1.1}, {"later": 0.3}, {"sooner": 0.3})
+"""As which an effect may not count: grips that are wider, open later or close sooner (`World.gripped`)."""
 TRIES = 7
 """Runs of the search for a magnitude."""
 PLACES = 4
@@ -137,11 +136,14 @@ def _hide(name, world, plain, engine, free, seeing, rng, say) -> tuple[np.ndarra
 
 def left_open(world: World, plain: np.ndarray, engine: Solver) -> list[np.ndarray]:
     """Changes of the plain paths [m], (K, T, 3) each, as which what is hidden may not count: another modulus, Poisson's
-    ratio and viscosity, other grips, a lag of the tracker and another scale."""
+    ratio and viscosity, other grips and other ways in which they take tissue along, none of which a recording tells, a
+    lag of the tracker and another scale."""
     law = world.material
     stiffer = replace(law, E=1.25 * law.E, eta=1.25 * law.eta)
     others = [world.of_material(m) for m in (stiffer, replace(law, nu=law.nu - 0.04), replace(law, eta=1.25 * law.eta))]
-    others += [other for how in OTHER_GRIPS if (other := world.gripped(**how)).grips != world.grips]
+    others += [world.gripped(**how) for how in OTHER_GRIPS]
+    handled = {grip.handling for grip in world.grips}
+    others += [world.gripped(handling=way) for way in HANDLING if handled != {way}]
     moved = [engine.paths(other, ()) - plain for other in others]
     return [*moved, np.gradient(plain, axis=1), plain - plain[:, :1]]
 
