@@ -89,7 +89,8 @@ def without_track(
     progress(0.01, 1, f"again without point {point}: {said}")
     visible = recording.visible.copy()
     visible[point] = False
-    found, physics, mismatch = diagnose(replace(recording, visible=visible), settings, progress, memo, single)
+    less = replace(recording, visible=visible)
+    found, physics, mismatch = diagnose(less, settings, progress, memo.without(point), single)
     noise = found.noise | {"left_out": [point, *found.noise.get("left_out", [])]}
     words = f"{found.words} Point {point} was left out: {said}."
     return replace(found, noise=noise, words=words), physics, mismatch

@@ -27,6 +27,10 @@ class Memo:
         """The same folder for runs on a grid of another spacing, over the cube root of the body's volume."""
         return replace(self, about=f"{self.about} {grid}")
 
+    def without(self, point: int) -> "Memo":
+        """The same folder for tracks of all points but one; a run's tracks are of the points that were looked at."""
+        return replace(self, about=f"{self.about} without point {point}")
+
     def __call__(self, what: Any, make: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
         """The arrays made for `what` (JSON-able), from the folder if they are there."""
         if self.folder is None:

@@ -12,6 +12,7 @@ from surgisim.artifacts.motion import Motion
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import diagnose
 from surgisim.diagnosis.clip import clip_of
+from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.single_track import single_track
 from surgisim.diagnosis.strays import strayed
 from surgisim.recordings.recording import no_grips
@@ -114,11 +115,11 @@ def test_a_law_that_one_track_alone_asks_for_is_that_track_s(spread, alone):
     assert single_track(replace(other, clip=video), refit) is None
 
 
-def test_without_that_track_it_is_diagnosed_again_and_said(monkeypatch):
+def test_without_that_track_it_is_diagnosed_again_and_said(monkeypatch, tmp_path):
     seen = []
 
     def again(recording, settings, progress, memo, single):
-        seen.append((recording.visible.any(1), single))
+        seen.append((recording.visible.any(1), single, memo))
         base = {"E": {"value": 1.0}}
         found = Diagnosis(
             "r", "nothing detectable", [], [], {}, [], {}, {}, 0.0, "Nothing.", base, {"left_out": [3]}, {}
@@ -126,8 +127,12 @@ def test_without_that_track_it_is_diagnosed_again_and_said(monkeypatch):
         return found, None, None
 
     monkeypatch.setattr(diagnose, "diagnose", again)
-    made = recording()
-    found, *_ = diagnose.without_track(made, 9, "hidden_contact", Diagnosing(), lambda *_: None, None, 2)
+    made, runs = recording(), Memo(tmp_path, "a recording")
+    runs("tracks", lambda: {"seen": np.zeros((len(made.points), 3))})
+    found, *_ = diagnose.without_track(made, 9, "hidden_contact", Diagnosing(), lambda *_: None, runs, 2)
     assert (np.flatnonzero(~seen[0][0]).tolist(), seen[0][1]) == ([9], 2)
+    # Tracks that were kept are of all points.
+    fewer = np.zeros((len(made.points) - 1, 3))
+    assert seen[0][2]("tracks", lambda: {"seen": fewer})["seen"].shape == fewer.shape
     assert found.noise["left_out"] == [9, 3]
     assert found.words == "Nothing. Point 9 was left out: its track alone asked for hidden contact."
