@@ -16,6 +16,7 @@ from surgisim.diagnosis.nuisance import Group, positions, release, span
 from surgisim.diagnosis.perceived import OF_TRACKS
 from surgisim.diagnosis.prospect import Prospect, prospect
 from surgisim.diagnosis.saturated import Saturated, SmoothFit, saturated
+from surgisim.diagnosis.sight import Sight
 
 LAW = 100.0
 """Length of a law's whitened response at one standard deviation of its strength, where it is weighed beside a drift."""
@@ -109,6 +110,11 @@ class Case:
         """What a residual may hold beside a base whose numbers and moments of release the engine searches."""
         searched = positions(self.groups, {release(*each) for each in self.clip.releases()})
         return metric(np.delete(self.space.columns, [*range(*self.slopes.indices(10**9)), *searched], axis=1))
+
+    @cached_property
+    def sight(self) -> Sight:
+        """What hypotheses are weighed by."""
+        return Sight(self.whiten, self.space, self.clip.seen[:, : self.clip.until], self.clip.device)
 
     @cached_property
     def saturated(self) -> Saturated:

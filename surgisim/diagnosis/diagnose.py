@@ -280,7 +280,7 @@ def prepare_case(
         noise = replace(
             noise, level=np.full(len(clip.kept), noise.sigma), shared=0.0, rigid=0.0, tilt=0.0, lasting=0.0, white=1.0
         )
-    whiten = whitener(noise, clip.rest, clip.seen[:, fitted], settings.offsets)
+    whiten = whitener(noise, clip.rest, clip.seen[:, fitted], settings.offsets, clip.device)
     at_rest = nuisance.drift_of(clip, noise, settings.offsets)
     drift = at_rest if drift is None else drift
 

@@ -18,12 +18,10 @@ from scipy.special import log_ndtr, logsumexp
 
 from surgisim.diagnosis.form import Block
 from surgisim.diagnosis.hypothesis import Hypothesis
-from surgisim.diagnosis.metric import Metric
+from surgisim.diagnosis.sight import Left, Products, Sight
 
 SIZES = (1.5e-4, 4e-4, 1e-3)
 """RMS length of what an effect does to the points, beforehand [m]."""
-ROUNDED = 0.01
-"""Chi square below zero beyond which products of signatures, never negative, lost too much to rounding [1]."""
 
 
 @dataclass(frozen=True)
@@ -43,45 +41,49 @@ class Finding:
     """RMS of its signature at the most likely amplitude [m]."""
 
 
-def judge(block: Block, whiten, space: Metric, cleared: np.ndarray, source: int, seen: np.ndarray) -> list[Finding]:
-    """Every hypothesis of a block against residuals that `space` cleared, (N, 1 + D): the recording's, then nulls."""
-    mask = seen[None, :, :, None]
-    plain = np.einsum("ckti,dkti->cd", block.columns * mask, block.columns, optimize=True) / seen.sum()
-    # Whitening is done in single precision, which what stiffens exponentially leaves where tissue is stretched far.
-    size = np.sqrt(np.maximum(np.diag(plain), 1e-60))
-    white = whiten((block.columns / size[:, None, None, None]).astype(np.float32)).T
-    gram = space.gram(white, white)
-    if SIZES[-1] ** 2 * np.linalg.eigvalsh(gram)[0] < -ROUNDED:
-        gram = space.exact_gram(white)
-    gram = gram * size[:, None] * size
-    shadow = (white.T @ cleared).astype(float) * size[:, None]
-    return [weigh(h, gram, shadow, plain, source) for h in block.hypotheses]
+def judge(block: Block, sight: Sight, left: Left, source: int) -> list[Finding]:
+    """Every hypothesis of a block against residuals: the recording's, then nulls."""
+    products, found = sight.products(block.columns, left), {}
+    alike: dict[tuple, list[int]] = {}
+    for n, h in enumerate(block.hypotheses):
+        alike.setdefault((h.mix.shape[1], bool(h.sign)), []).append(n)
+    for mine in alike.values():
+        found |= zip(mine, weigh([block.hypotheses[n] for n in mine], products, source), strict=True)
+    return [found[n] for n in range(len(found))]
 
 
-def weigh(h: Hypothesis, gram: np.ndarray, shadow: np.ndarray, plain: np.ndarray, source: int) -> Finding:
-    G, b = h.mix.T @ gram @ h.mix, h.mix.T @ shadow
-    size = h.mix.T @ plain @ h.mix
-    rms = np.sqrt(np.maximum(np.diag(size), 1e-30))
-    parts, best = [], None
+def weigh(alike: list[Hypothesis], products: Products, source: int) -> list[Finding]:
+    """Hypotheses of as many amplitudes, H, and the same freedom of sign, with their block's products."""
+    mix = np.stack([h.mix for h in alike])
+    back = mix.swapaxes(1, 2)
+    G, b, size = back @ products.gram @ mix, back @ products.shadow, back @ products.plain @ mix
+    rms = np.sqrt(np.maximum(np.diagonal(size, axis1=1, axis2=2), 1e-30))
+    count = mix.shape[2]
+    one_sided = count == 1 and bool(alike[0].sign)
+    logs, amplitudes, spreads = [], [], []
     for wanted in SIZES:
-        L = wanted / rms / np.sqrt(len(rms))
-        A = np.eye(len(L)) + L[:, None] * G * L[None]
-        y = L[:, None] * b
+        L = wanted / rms / np.sqrt(count)
+        A = np.eye(count) + L[:, :, None] * G * L[:, None]
+        y = L[:, :, None] * b
         x = np.linalg.solve(A, y)
-        logs = 0.5 * (y * x).sum(0) - 0.5 * np.linalg.slogdet(A)[1]
-        sd = np.sqrt(np.diag(np.linalg.inv(A)))
-        if h.sign and len(L) == 1:
-            logs = logs + log_ndtr(x[0] / sd[0]) + np.log(2)
-        parts.append(logs)
-        if best is None or logs[0] > best[0]:
-            amplitude = L * x[:, 0]
-            if h.sign and len(L) == 1:
-                amplitude = np.maximum(amplitude, 0)
-            best = (logs[0], amplitude, L * sd)
-    logs = logsumexp(parts, axis=0) - np.log(len(SIZES))
-    a = best[1]
-    gain = float(2 * a @ b[:, 0] - a @ G @ a)
-    return Finding(h, float(logs[0]), a, best[2], gain, logs[1:], source, float(np.sqrt(max(a @ size @ a, 0))))
+        log = 0.5 * (y * x).sum(1) - 0.5 * np.linalg.slogdet(A)[1][:, None]
+        sd = np.sqrt(np.diagonal(np.linalg.inv(A), axis1=1, axis2=2))
+        amplitude = L * x[:, :, 0]
+        if one_sided:
+            log = log + log_ndtr(x[:, 0] / sd) + np.log(2)
+            amplitude = np.maximum(amplitude, 0)
+        logs.append(log)
+        amplitudes.append(amplitude)
+        spreads.append(L * sd)
+    which, each = np.argmax([log[:, 0] for log in logs], axis=0), np.arange(len(alike))
+    a, spread = np.stack(amplitudes)[which, each], np.stack(spreads)[which, each]
+    log = logsumexp(logs, axis=0) - np.log(len(SIZES))
+    gain = 2 * (a * b[:, :, 0]).sum(1) - np.einsum("nh,nhk,nk->n", a, G, a)
+    moved = np.sqrt(np.maximum(np.einsum("nh,nhk,nk->n", a, size, a), 0))
+    return [
+        Finding(h, float(log[n, 0]), a[n], spread[n], float(gain[n]), log[n, 1:], source, float(moved[n]))
+        for n, h in enumerate(alike)
+    ]
 
 
 @dataclass(frozen=True)

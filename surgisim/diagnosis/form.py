@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surgisim.diagnosis.answers import Answers
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.hypothesis import Hypothesis
 
@@ -18,9 +19,14 @@ APART = 0.0075
 
 @dataclass(frozen=True)
 class Block:
-    columns: np.ndarray
+    columns: np.ndarray | Answers
     """Displacement of the points by one unit of each [m], (C, K, T, 3)."""
     hypotheses: list[Hypothesis]
+
+    @property
+    def written_out(self) -> np.ndarray:
+        """The columns [m], (C, K, T, 3)."""
+        return self.columns.columns if isinstance(self.columns, Answers) else self.columns
 
 
 def knots(clip: Clip, apart: float = KNOT) -> np.ndarray:

@@ -287,8 +287,10 @@ def _reason(
     free = not case.settings.calibrated
     clear = free or chosen.log_evidence >= calibration.CLEAR
     seen = free or borne >= calibration.BORNE_OUT or (borne > 0 and chosen.foretold)
-    # What the plain error does not bear out and is contradicted by frames held out is not certain to be anything.
-    certain = case.overstretched or (clear and (seen or chosen.support >= calibration.CLEAR))
+    # What the plain error does not bear out and is contradicted by frames held out is not certain to be anything,
+    # unless the fitted ones leave no doubt.
+    sure = clear and (seen or chosen.support >= calibration.CLEAR)
+    certain = case.overstretched or sure or chosen.log_evidence >= calibration.CERTAIN
     if not certain and not seen:
         return "faint"
     if chosen.loose:

@@ -6,7 +6,6 @@ With whitened columns U scaled to their prior standard deviations, the covarianc
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
@@ -35,15 +34,6 @@ class Metric:
         plain = (a.T.astype(np.float32) @ b.astype(np.float32)).astype(float)
         mine = self.seen_through(a)
         return plain - mine.T @ cho_solve(self.factor, mine if b is a else self.seen_through(b))
-
-    def exact_gram(self, a: np.ndarray) -> np.ndarray:
-        """`gram` of columns (N, C) with each other in double precision, of what the directions take all but wholly."""
-        mine = products(self.columns, a)
-        return products(a, a) - mine.T @ cho_solve(self._exact_factor, mine)
-
-    @cached_property
-    def _exact_factor(self) -> tuple:
-        return cho_factor(np.eye(self.columns.shape[1]) + products(self.columns, self.columns))
 
     def cleared(self, vectors: np.ndarray) -> np.ndarray:
         """(1 + U U^T)^-1 of vectors (N, C), float32: their plain products with others are those of `gram`."""

@@ -15,10 +15,13 @@ constant. Projecting those out of the whitened vectors is the exact marginal lik
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import torch
 
+from surgisim.diagnosis.device_whitener import DeviceWhitener
 from surgisim.recordings.ways import told_of, turned
 
 PARTS = ("shared", "rigid", "tilt", "lasting", "white")
@@ -136,10 +139,15 @@ class Whitener:
     """Orthonormal, what missing samples become, of one axis, (K T, L) float32."""
     ways: np.ndarray | None = None
     """Directions of each point's axes, (K, 3, 3); x, y and z if None."""
+    device: str = "cpu"
+    """Where fields are whitened."""
 
     def __call__(self, field: np.ndarray) -> np.ndarray:
         """Of fields [m], (..., K, T, 3), as (..., K T 3), in their own precision."""
         kind = np.float32 if field.dtype == np.float32 else float
+        if self.device != "cpu":
+            there = self._there_single if kind is np.float32 else self._there
+            return there.of_fields(turned(field.astype(kind, copy=False), self.ways))
         scaled = turned(field, self.ways) * (self.mask[..., None] * self.scale[:, None]).astype(kind)
         mode = np.tensordot(self.axes.T.astype(kind), np.moveaxis(scaled, -3, 0), (1, 0))
         shape = mode.shape
@@ -148,6 +156,14 @@ class Whitener:
         white = white.reshape(shape[0], shape[-2], *shape[1:-2], shape[-1])
         white = np.moveaxis(np.moveaxis(white, 1, -2), 0, -3)
         return white.reshape(*white.shape[:-3], int(np.prod(white.shape[-3:])))
+
+    @cached_property
+    def _there(self) -> DeviceWhitener:
+        return DeviceWhitener(self, self.device)
+
+    @cached_property
+    def _there_single(self) -> DeviceWhitener:
+        return DeviceWhitener(self, self.device, torch.float32)
 
     def back(self, white: np.ndarray) -> np.ndarray:
         """The transpose: of numbers (K T 3,), as (K, T, 3)."""
@@ -177,7 +193,7 @@ class Whitener:
         return (flat - lost @ (lost.T @ flat)).reshape(white.shape)
 
 
-def whitener(noise: Noise, rest: np.ndarray, seen: np.ndarray, offsets: bool = True) -> Whitener:
+def whitener(noise: Noise, rest: np.ndarray, seen: np.ndarray, offsets: bool = True, device: str = "cpu") -> Whitener:
     """For points `rest` [m], (K, 3), seen where `seen`, (K, T); `offsets`: whether each has a constant of its own."""
     axes, shared, camera = noise.modes(rest)
     factor = np.linalg.cholesky(noise.temporal(seen.shape[1], shared, camera))
@@ -185,7 +201,7 @@ def whitener(noise: Noise, rest: np.ndarray, seen: np.ndarray, offsets: bool = T
     still = inverse.sum(-1)
     still = still / np.linalg.norm(still, axis=1, keepdims=True) * offsets
     none = np.zeros((seen.size, 0), np.float32)
-    plain = Whitener(1 / noise.scale, axes, inverse, still, seen.astype(float), none, noise.ways)
+    plain = Whitener(1 / noise.scale, axes, inverse, still, seen.astype(float), none, noise.ways, device)
     return replace(plain, lost=_lost(plain, ~seen))
 
 

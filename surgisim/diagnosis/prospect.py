@@ -98,7 +98,7 @@ def prospect(case) -> Prospect | None:
     clip = case.clip
     if clip.frames == clip.until or not clip.seen[:, clip.until :].any():
         return None
-    whiten = whitener(case.noise, clip.rest, clip.seen, case.settings.offsets)
+    whiten = whitener(case.noise, clip.rest, clip.seen, case.settings.offsets, clip.device)
     fixed = [whiten(g.columns).T.astype(np.float32) for g in case.groups]
     still = np.zeros((len(case.base.slopes), *clip.moved.shape))
     still[:, :, : clip.until] = case.base.slopes

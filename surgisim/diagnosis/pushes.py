@@ -4,6 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from surgisim.diagnosis import answers
+from surgisim.diagnosis.answers import Answers
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import angles, hats, knots, scale
 from surgisim.diagnosis.hypothesis import RISE, Hypothesis
@@ -47,22 +49,21 @@ def weight(look: Look, place: Place) -> np.ndarray:
     return mine / (mine * look.base.prepared.simulator.volume_p).sum()
 
 
-def columns(look: Look, place: Place) -> np.ndarray:
+def columns(look: Look, place: Place) -> Answers:
     """By one newton along x, y and z, at one knot after the other [m/N], (3 B, K, T, 3)."""
     return look.once("push", place, lambda: of_force(look, weight(look, place)))
 
 
-def of_force(look: Look, each: np.ndarray) -> np.ndarray:
+def of_force(look: Look, each: np.ndarray) -> Answers:
     """The same by a force per volume [N/m^3], (P,), along x, y and z."""
     return of_load(look, look.base.tangent.of_push(each[None, :, None] * np.eye(3)[:, None]))
 
 
-def of_load(look: Look, loads: np.ndarray) -> np.ndarray:
+def of_load(look: Look, loads: np.ndarray) -> Answers:
     """The same by three nodal forces [N], (3, 3 A)."""
     near = look.base.tangent
     states = near.at_states(np.broadcast_to(loads, (len(near.frames), *loads.shape)))
-    courses = hats(times(look.clip), look.clip)
-    return np.stack([near.over_time(states[:, d], course) for d in range(3) for course in courses])
+    return answers.each(states.swapaxes(0, 1), near.share, hats(times(look.clip), look.clip))
 
 
 def push(force: np.ndarray, onset: float, end: float | None) -> dict[str, float]:

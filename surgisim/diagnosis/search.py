@@ -12,13 +12,13 @@ from surgisim.diagnosis.locate import worst
 
 def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts | None = None) -> list[Finding]:
     """Every hypothesis of `parts` (or of all that is cheap) against a whitened residual."""
-    residuals = case.space.cleared(np.concatenate([z[:, None].astype(np.float32), nulls], 1))
+    left = case.sight.of(np.concatenate([z[:, None].astype(np.float32), nulls], 1))
     only = worst(case.clip, case.base.simulated, case.noise) if case.settings.cause == "symptom" else None
     parts, found, source = list(parts or blocks(case.clip, case.base, case.memo, only)), [], 0
     for n, (name, make) in enumerate(parts):
         progress(n / len(parts), f"trying {name} ({n + 1} of {len(parts)})")
         for block in make():
-            found += judge(block, case.whiten, case.space, residuals, source, case.clip.seen[:, : case.clip.until])
+            found += judge(block, case.sight, left, source)
             source += 1
     return found
 
@@ -26,10 +26,10 @@ def search(case: Case, z: np.ndarray, nulls: np.ndarray, progress, parts: Parts 
 def sharpened(case: Case, law: Score, z: np.ndarray, start: Finding | None = None) -> tuple[Finding, float]:
     """A law's best finding, or the best near `start`, on two finer lattices, and the law's evidence there."""
     best = start or law.best
-    residual, seen = case.space.cleared(z[:, None]), case.clip.seen[:, : case.clip.until]
+    left = case.sight.of(z[:, None])
     for step in (1.0, 0.5):
         for block in finer(case.clip, case.base, best.hypothesis, step):
-            found = judge(block, case.whiten, case.space, residual, -1, seen)
+            found = judge(block, case.sight, left, -1)
             best = max([best, *(f for f in found if f.hypothesis.term == best.hypothesis.term)], key=lambda f: f.gain)
     return best, law.evidence + 0.5 * (best.gain - law.best.gain)
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from surgisim.diagnosis.answers import Answers
 from surgisim.diagnosis.hypothesis import SETS_IN, ease
 from surgisim.diagnosis.look import Look
 
@@ -24,21 +25,23 @@ def patterns(look: Look, axis: np.ndarray, wavelength: float) -> np.ndarray:
     return np.stack([np.ones_like(late), np.cos(late), np.sin(late), np.cos(2 * late), np.sin(2 * late)])
 
 
-def columns(look: Look, states: np.ndarray, periods: Sequence[float], start: float) -> np.ndarray:
+def columns(look: Look, states: np.ndarray, periods: Sequence[float], start: float) -> Answers:
     """From what each pattern does, (M, S, K, 3) [m], to columns, (1 + PARTS len(periods), K, T, 3)."""
     time = look.clip.time[: look.clip.until]
     up = ease((time - start) / SETS_IN)
-    courses = [[(0, up)]]
+    courses = np.zeros((1 + PARTS * len(periods), len(states), len(time)))
+    courses[0, 0], at = up, 1
     for period in periods:
         x = 2 * np.pi / period * time
         for n in (1, 2):
             s, c = up * np.sin(n * x), up * np.cos(n * x)
-            courses += [[(2 * n - 1, s), (2 * n, -c)], [(2 * n - 1, c), (2 * n, s)]]
-    share = look.base.tangent.share
-    if len(states) == 1:
-        courses = [[(0, course) for _, course in parts[:1]] for parts in courses]
-    found = [sum(np.tensordot(share * g[:, None], states[m], (1, 0)) for m, g in parts) for parts in courses]
-    return np.stack(found).swapaxes(1, 2)
+            if len(states) == 1:
+                courses[at : at + 2, 0] = s, c
+            else:
+                courses[at, [2 * n - 1, 2 * n]] = s, -c
+                courses[at + 1, [2 * n - 1, 2 * n]] = c, s
+            at += 2
+    return Answers(states, look.base.tangent.share, courses)
 
 
 def mix(periods: Sequence[float], which: int, phase: float, duty: float) -> np.ndarray:

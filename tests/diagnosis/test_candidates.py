@@ -44,7 +44,7 @@ def tried(case):
     cheap = blocks(case.clip, case.base, case.memo, SPOT)
     for _, make in [*cheap, *costly(case.clip, case.base, case.memo, 1)]:
         for block in make():
-            assert np.isfinite(block.columns).all()
+            assert np.isfinite(block.written_out).all()
             for h in block.hypotheses:
                 assert h.mix.shape[0] == len(block.columns)
                 assert np.isfinite(h.mix).all()
@@ -60,7 +60,7 @@ def strength(h) -> np.ndarray:
 
 
 def signature(block, h) -> np.ndarray:
-    return np.tensordot(h.mix @ strength(h), block.columns, (0, 0))
+    return np.tensordot(h.mix @ strength(h), block.written_out, (0, 0))
 
 
 @pytest.mark.slow

@@ -9,6 +9,8 @@ from surgisim.diagnosis.evidence import SIZES, by_law, judge, weigh
 from surgisim.diagnosis.form import Block
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.metric import metric
+from surgisim.diagnosis.noise import Noise, whitener
+from surgisim.diagnosis.sight import Products, Sight
 
 SPACE = metric(np.zeros((400, 1)))
 
@@ -16,7 +18,7 @@ SPACE = metric(np.zeros((400, 1)))
 def found(signature, residual, term="here", sign=0):
     white = signature[:, None]
     gram, shadow = SPACE.gram(white, white), SPACE.gram(white, residual)
-    return weigh(Hypothesis(term, np.ones((1, 1)), sign), gram, shadow, np.array([[1e-8]]), 0)
+    return weigh([Hypothesis(term, np.ones((1, 1)), sign)], Products(np.array([[1e-8]]), gram, shadow), 0)[0]
 
 
 @pytest.fixture
@@ -61,17 +63,22 @@ def test_the_many_places_of_one_scope_do_not_dilute_another(parts):
 def test_what_nuisances_take_all_but_wholly_is_weighed_without_rounding(parts):
     rng, _ = parts
     points, frames, noise = 40, 25, 5e-6
-    white = lambda fields: (fields / np.float32(noise)).reshape(len(fields), -1)  # noqa: E731
+    seen = np.ones((points, frames), bool)
+    white = whitener(
+        Noise(np.full(points, noise), 0, 0.01, 0, 0, 0, 0, 0, 0, 1.0), rng.standard_normal((points, 3)), seen
+    )
     open_too = rng.standard_normal((6, points, frames, 3)).astype(np.float32)
     space = metric(white(open_too).T)
     taken = np.einsum("cs,sktj->cktj", rng.standard_normal((4, 6)), open_too)
-    rounded, exact = (SIZES[-1] ** 2 * by(white(taken).T) for by in (lambda a: space.gram(a, a), space.exact_gram))
-    assert np.linalg.eigvalsh(rounded)[0] < -0.1
-    assert np.linalg.eigvalsh(exact)[0] > -1e-3
+    rounded = white(taken).T
+    assert SIZES[-1] ** 2 * np.linalg.eigvalsh(space.gram(rounded, rounded))[0] < -0.1
+    sight = Sight(white, space, seen)
+    left = sight.of(rng.standard_normal((points * frames * 3, 2)).astype(np.float32))
     block = Block(taken.astype(float), [Hypothesis("taken", np.eye(4), 0), Hypothesis("one", np.eye(4)[:, :1], 1)])
-    residual = space.cleared(rng.standard_normal((points * frames * 3, 2)).astype(np.float32))
+    exact = SIZES[-1] ** 2 * sight.products(block.columns, left).gram
+    assert np.linalg.eigvalsh(exact)[0] > -1e-3
     with np.errstate(invalid="raise"):
-        found = judge(block, white, space, residual, 0, np.ones((points, frames), bool))
+        found = judge(block, sight, left, 0)
     for f in found:
         assert np.isfinite([f.log_evidence, *f.nulls, *f.spread]).all()
         assert (f.spread > 0).all()

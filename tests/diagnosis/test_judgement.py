@@ -189,6 +189,12 @@ def test_a_law_is_not_named_for_little():
     assert reason(explanation(evidence=CLEAR - 1), borne=0.5 * BORNE_OUT, case=UNCALIBRATED) == "named"
 
 
+def test_where_the_fitted_frames_leave_no_doubt_something_is_hidden_though_all_else_speaks_against_the_law():
+    much_worse = Gain(-4 * CERTAIN, -5 * CERTAIN, -3 * CERTAIN, 50.0)
+    said = {e: reason(explanation(evidence=e, ahead=much_worse), borne=0.0) for e in (CERTAIN - 1, CERTAIN)}
+    assert said == {CERTAIN - 1: "faint", CERTAIN: "refuted"}
+
+
 def test_a_law_beyond_doubt_that_foretells_as_much_as_it_promises_need_not_be_borne_out_so_far():
     def said(borne: float, **changed) -> str:
         return reason(explanation(**{"evidence": CERTAIN, "ahead": BETTER} | changed), borne=borne)

@@ -39,7 +39,7 @@ def quiet(*_):
 
 def added(case, block) -> np.ndarray:
     """A whitened residual of nothing with a block's first hypothesis in it, as large as can be seen."""
-    field = np.tensordot(block.hypotheses[0].mix[:, 0], block.columns, (0, 0))
+    field = np.tensordot(block.hypotheses[0].mix[:, 0], block.written_out, (0, 0))
     size = 4e-4 / np.sqrt((field**2).sum(-1).mean())
     return case.nulls[:, 0] + case.whiten(size * field)
 
@@ -81,7 +81,7 @@ def test_every_form_is_a_law_that_the_engine_has():
     found = {}
     for _, make in candidates.without_a_name(look):
         for block in make():
-            assert np.isfinite(block.columns).all()
+            assert np.isfinite(block.written_out).all()
             found |= {(h.term, h.about.get("kind"), h.scope, h.onset is None): h for h in block.hypotheses}
     assert {term for term, *_ in found} == set(forms.catalogue())
     for h in found.values():

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from surgisim.diagnosis import knobs, waves
+from surgisim.diagnosis.answers import side_by_side
 from surgisim.diagnosis.candidate import Candidate, Parts, stronger
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import Block, angles, plane, scale
@@ -68,7 +69,7 @@ def tried(look: Look) -> Parts:
 
     def travelling(where: Where, count: int, lengths: Sequence[float]) -> Iterator[Block]:
         for turn in np.arange(count) * 2 * np.pi / count:
-            yield _travelling(look, where, turn, size * np.array(lengths), PERIODS, PHASES)
+            yield from _travelling(look, where, turn, size * np.array(lengths), PERIODS, PHASES)
 
     def standing() -> Iterator[Block]:
         turns = np.arange(TURNS_STANDING) * np.pi / TURNS_STANDING
@@ -93,10 +94,10 @@ def finer(look: Look, h: Hypothesis, step: float) -> Iterator[Block]:
         return
     for turn in b["turn"] + near * 2 * np.pi / TURNS:
         lengths = b["wavelength"] * np.exp(0.5 * near)
-        yield _travelling(look, here(h), turn, lengths, periods, phases, starts, (b["duty"],))
+        yield from _travelling(look, here(h), turn, lengths, periods, phases, starts, (b["duty"],))
     for where in around(look, h, step):
         only = [b["wavelength"]], [b["period"]], phases, [b["start"]], (b["duty"],)
-        yield _travelling(look, where, b["turn"], *only)
+        yield from _travelling(look, where, b["turn"], *only)
 
 
 def _axis(look: Look, turn: float) -> np.ndarray:
@@ -112,19 +113,14 @@ def _pulled(look: Look, axis: np.ndarray, shares: np.ndarray) -> np.ndarray:
 
 def _travelling(
     look: Look, where: Where, turn: float, lengths: Sequence[float], periods, phases, starts=(0.0,), duties=DUTIES
-) -> Block:
+) -> Iterator[Block]:
     axis, weight = _axis(look, turn), where.weight(look.rest)
-    columns, forms = [], []
     for length in lengths:
         states = _pulled(look, axis, weight * waves.patterns(look, axis, length))
         for start in starts:
-            forms.append((axis, length, turn, start))
-            columns.append(waves.columns(look, states, periods, start))
-    found = []
-    for k, form in enumerate(forms):
-        mine = np.eye(len(forms))[k]
-        found += _hypotheses(where, form, periods, phases, duties, lambda mix, mine=mine: np.kron(mine, mix))
-    return Block(np.concatenate(columns), found)
+            form = (axis, length, turn, start)
+            found = [*_hypotheses(where, form, periods, phases, duties, lambda mix: mix)]
+            yield Block(waves.columns(look, states, periods, start), found)
 
 
 def _standing(
@@ -135,7 +131,7 @@ def _standing(
     shares = np.stack([w.weight(look.rest) for w in wheres])
     states = [_pulled(look, _axis(look, thread), shares) for thread in THREADS]
     for (q, where), start in itertools.product(enumerate(wheres), starts):
-        columns = np.concatenate([waves.columns(look, mine[q : q + 1], periods, start) for mine in states])
+        columns = side_by_side([waves.columns(look, mine[q : q + 1], periods, start) for mine in states])
         found = []
         for turn in turns:
             form, threads = (_axis(look, turn), STANDS, turn, start), _threads(turn)

@@ -7,6 +7,7 @@ import numpy as np
 
 from surgisim.artifacts.motion import Motion
 from surgisim.diagnosis import knobs
+from surgisim.diagnosis.answers import Answers
 from surgisim.diagnosis.candidate import Candidate, Numbers, Parts
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.form import Block
@@ -60,28 +61,27 @@ def _slipping(look: Look) -> Iterator[Block]:
         loads = near.anchored(1 + j).T
         states = near.at_states(np.broadcast_to(loads, (len(near.frames), *loads.shape)))
         path = np.where(active[:, None], motion.position[j, :until] - motion.center_rest[j], 0.0)
-        way = [near.over_time(states[:, d], np.ones(until)) * path[None, :, d, None] for d in range(3)]
-        full = -sum(way)
+        back = -path.T
         time, length = clip.time[:until], np.linalg.norm(path, axis=1)
         # A share lost from the start is how firmly the grid carries a grip (nuisance.grips), not a slip.
         begin, last = time[np.argmax(length > 0.3 * length.max())], time[active][-1]
-        columns, found = [], []
+        courses, found = [], []
         for onset in np.linspace(begin, last - 0.15, 12):
             for tau in TAUS:
                 late = np.maximum(time - onset, 0) / tau
-                columns.append(full * ((1 - np.exp(-late)) ** 2)[None, :, None])
+                courses.append(back * (1 - np.exp(-late)) ** 2)
                 found.append((onset, {"tau": tau, "grip": j}))
             start = np.interp(onset, time, length)
             course = np.where(
                 (time > onset) & (length > 0), np.maximum(length - start, 0) / np.maximum(length, 1e-9), 0
             )
             if course.max() > 0.05:
-                columns.append(full * course[None, :, None])
+                courses.append(back * course)
                 found.append((onset, {"tau": 0.0, "grip": j}))
         place = Place(tuple(motion.center_rest[j]), float(motion.radius[j]))
-        eye = np.eye(len(columns))
+        eye = np.eye(len(courses))
         yield Block(
-            np.stack(columns),
+            Answers(states.swapaxes(0, 1), near.share, np.stack(courses)),
             [Hypothesis(NAME, eye[:, k : k + 1], 1, place, t, last, a, "grip") for k, (t, a) in enumerate(found)],
         )
 
