@@ -35,6 +35,17 @@ class Plan:
     """The config itself, for work on what is no clip."""
 
 
+def table_of(config: Mapping[str, Any], key: str, default: Path) -> Path:
+    """The file of clips or of variants that a config names, `default` if it names none. Raises Problem for no path."""
+    told = config.get(key, default)
+    if not isinstance(told, str | Path):
+        raise Problem(
+            f"config: key '{key}' is {told!r}, and the path of a file is wanted, such as {default.name} of this "
+            "program's config folder. Write the rows there, and its path here."
+        )
+    return Path(told)
+
+
 def plan(config: Mapping[str, Any], *, clips: Path | Mapping[str, Clip], variants: Path) -> Plan:
     """Merge and check everything. What a variant changes wins over the clip, the clip over config.
 

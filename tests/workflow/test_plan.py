@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from surgisim.plan import merged, plan
+from surgisim.plan import merged, plan, table_of
 from surgisim.problem import Problem
 
 
@@ -29,6 +29,16 @@ def test_a_typo_names_the_key_and_the_nearest_one(tables):
     said = says(tables, config={"ingest": {"sise": 3}})
     assert "'ingest.sise'" in said
     assert "did you mean 'size'" in said
+
+
+def test_a_table_is_a_path(tmp_path):
+    usual = tmp_path / "clips.tsv"
+    assert table_of({}, "clips", usual) == usual
+    assert table_of({"clips": "mine.tsv"}, "clips", usual).name == "mine.tsv"
+    with pytest.raises(
+        Problem, match=r"key 'clips' is \['a.mp4'\], and the path of a file is wanted, such as clips.tsv"
+    ):
+        table_of({"clips": ["a.mp4"]}, "clips", usual)
 
 
 def test_a_stage_that_does_not_exist_names_the_nearest_one(tables):

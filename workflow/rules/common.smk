@@ -19,7 +19,7 @@ from surgisim.config.whole import PARENTS
 from surgisim.digest import digest
 from surgisim.perception.ingest.archive import is_film
 from surgisim.phantom.family import family, told_focal
-from surgisim.plan import plan
+from surgisim.plan import plan, table_of
 from surgisim.problem import Problem
 from surgisim.proof.known.catalogue import catalogue as known_recordings
 from surgisim.proof.shuffle import partner
@@ -85,10 +85,10 @@ try:
             else (
                 invented(family(SEED, int(CLIPS)))
                 if str(CLIPS).isdigit()
-                else Path(CLIPS)
+                else table_of(config, "clips", ROOT / "config" / "clips.tsv")
             )
         ),
-        variants=Path(config.get("variants", ROOT / "config" / "variants.yaml")),
+        variants=table_of(config, "variants", ROOT / "config" / "variants.yaml"),
     )
 except Problem as problem:
     raise WorkflowError(str(problem)) from None
