@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from surgisim.diagnosis import benchmark
 from surgisim.diagnosis.answers import Answers, each, side_by_side
 from surgisim.diagnosis.device_whitener import DeviceWhitener
 from surgisim.diagnosis.metric import metric
@@ -72,3 +73,10 @@ def test_a_device_whitens_as_numpy_does(kind):
     assert found.dtype == wanted.dtype == kind
     np.testing.assert_allclose(found, wanted, atol=(2e-5 if kind is np.float32 else 1e-6) * np.abs(wanted).max())
     np.testing.assert_allclose(there.of_fields(turned(fields, whiten.ways)[0, 0]), found[0, 0], atol=1e-5)
+
+
+def test_the_benchmark_compares_the_same_products():
+    found = benchmark.measured(points=20, frames=16, unseen=0.1, device="cpu")
+    assert {name for name in found if name.endswith("_apart")} == {"push_apart", "wave_apart"}
+    assert max(found["push_apart"], found["wave_apart"]) < 1e-6
+    assert min(found.values()) > 0

@@ -54,7 +54,8 @@ def twin(F, D, q, t, G, tau):
     C = np.swapaxes(F, -1, -2) @ F
     values, axes = np.linalg.eigh(C)
     stretch = np.sqrt(values)
-    T = 2 * G * (twin_deviator(of_eigenvalues(C, np.sqrt)) - twin_unpacked(q))
+    U = (axes * stretch[..., None, :]) @ np.swapaxes(axes, -1, -2)
+    T = 2 * G * (twin_deviator(U) - twin_unpacked(q))
     # d(psi)/dC where C = U^2: in the axes of U, dC_ij = (U_i + U_j) dU_ij.
     turned = np.swapaxes(axes, -1, -2) @ T @ axes
     S = axes @ (2 * turned / (stretch[..., :, None] + stretch[..., None, :])) @ np.swapaxes(axes, -1, -2)
