@@ -19,7 +19,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import torch
 
 from surgisim.diagnosis.device_whitener import DeviceWhitener
 from surgisim.recordings.ways import told_of, turned
@@ -163,7 +162,7 @@ class Whitener:
 
     @cached_property
     def _there_single(self) -> DeviceWhitener:
-        return DeviceWhitener(self, self.device, torch.float32)
+        return DeviceWhitener(self, self.device, "float32")
 
     def back(self, white: np.ndarray) -> np.ndarray:
         """The transpose: of numbers (K T 3,), as (K, T, 3)."""

@@ -12,10 +12,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-import torch
 
 from surgisim.diagnosis.answers import Answers
-from surgisim.diagnosis.device_whitener import DeviceWhitener
+from surgisim.diagnosis.device_whitener import Array, DeviceWhitener
 from surgisim.diagnosis.metric import Metric
 from surgisim.diagnosis.noise import Whitener
 from surgisim.recordings.ways import turned
@@ -37,9 +36,9 @@ class Products(NamedTuple):
 class Left:
     """Residuals that a metric has cleared."""
 
-    cleared: torch.Tensor
+    cleared: Array
     """(N, D)"""
-    back: torch.Tensor
+    back: Array
     """W^T of them, (T, 3 K, D)."""
 
 
@@ -62,44 +61,43 @@ class Sight:
         """Of displacements [m], (C, K, T, 3)."""
         products = self._of_answers if isinstance(columns, Answers) else self._of_columns
         with self._white.turn():
-            return Products(*(one.cpu().numpy() for one in products(columns, left)))
+            return Products(*(self._white.off(one) for one in products(columns, left)))
 
-    def _of_columns(self, columns: np.ndarray, left: Left) -> tuple[torch.Tensor, ...]:
+    def _of_columns(self, columns: np.ndarray, left: Left) -> tuple[Array, ...]:
         there = self._white
         fields = there.on(columns)
-        plain = torch.einsum("ckti,dkti->cd", fields * self._seen[:, :, None], fields)
+        plain = (fields * self._seen[:, :, None]).reshape(len(fields), -1) @ fields.reshape(len(fields), -1).T
         scaled = there.on(turned(columns, self.whiten.ways)) * there.scale[:, None] * there.mask[..., None]
-        white = self._side_by_side(scaled.permute(1, 2, 0, 3))
+        white = self._side_by_side(there.of.moveaxis(scaled, 0, 2))
         gram = self._beside_nuisances(white.T @ white, white.T @ self._columns)
         return plain / self._seen.sum(), gram, white.T @ left.cleared
 
-    def _of_answers(self, answers: Answers, left: Left) -> tuple[torch.Tensor, ...]:
+    def _of_answers(self, answers: Answers, left: Left) -> tuple[Array, ...]:
         there = self._white
         count, causes, frames = answers.courses.shape
         courses = there.on(answers.courses).swapaxes(1, 2).reshape(count, -1)
         share, states = there.on(answers.share), answers.states.swapaxes(1, 2)
-        fields = torch.einsum("ts,qksi->tqki", share, there.on(states))
-        known = fields * self._seen.T[:, None, :, None]
-        plain = _over_time(courses, known.flatten(2) @ fields.flatten(2).swapaxes(1, 2))
-        scaled = torch.einsum("ts,qksi->tqki", share, there.on(turned(states, self.whiten.ways)))
+        fields = there.of.tensordot(share, there.on(states), ([1], [2]))
+        flat, known = (one.reshape(frames, causes, -1) for one in (fields, fields * self._seen.T[:, None, :, None]))
+        plain = self._over_time(courses, known @ flat.swapaxes(1, 2))
+        scaled = there.of.tensordot(share, there.on(turned(states, self.whiten.ways)), ([1], [2]))
         scaled = scaled * there.scale * there.mask.T[:, None, :, None]
-        mine, shadow = (
-            courses @ (scaled.flatten(2) @ back).reshape(frames * causes, -1) for back in (self._nuisances, left.back)
-        )
+        flat = scaled.reshape(frames, causes, -1)
+        mine, shadow = (courses @ (flat @ back).reshape(frames * causes, -1) for back in (self._nuisances, left.back))
         # Pairs of frames are the cheaper the fewer causes there are, columns the fewer of them.
         by_pairs = 4 * frames * causes**2 < count * (frames + count)
         own = self._by_pairs(courses, scaled) if by_pairs else self._by_columns(courses, scaled)
         return plain / self._seen.sum(), self._beside_nuisances(own, mine), shadow
 
-    def _by_pairs(self, courses: torch.Tensor, scaled: torch.Tensor) -> torch.Tensor:
+    def _by_pairs(self, courses: Array, scaled: Array) -> Array:
         """S^T S by products of fields at all pairs of frames."""
         there, (frames, causes, count, _) = self._white, scaled.shape
-        modes = (there.axes.T @ scaled.permute(2, 0, 1, 3).reshape(count, -1)).reshape(count, frames * causes, 3)
-        total = torch.zeros((frames, causes, frames, causes), dtype=modes.dtype, device=modes.device)
+        modes = there.axes.T @ there.of.moveaxis(scaled, 2, 0).reshape(count, -1)
+        modes, total = modes.reshape(count, frames * causes, 3), 0.0
         for first in range(0, count, SIDE_BY_SIDE):
             some = slice(first, first + SIDE_BY_SIDE)
-            pairs = (modes[some] @ modes[some].swapaxes(1, 2)).reshape(-1, *total.shape)
-            total += (pairs * there.in_time[some][:, :, None, :, None]).sum(0)
+            pairs = (modes[some] @ modes[some].swapaxes(1, 2)).reshape(-1, frames, causes, frames, causes)
+            total = total + (pairs * there.in_time[some][:, :, None, :, None]).sum(0)
         own = courses @ total.reshape(frames * causes, -1) @ courses.T
         if there.sure:
             return own
@@ -107,64 +105,67 @@ class Sight:
         taken = courses @ taken.reshape(frames * causes, -1)
         return own - taken @ taken.T
 
-    def _by_columns(self, courses: torch.Tensor, scaled: torch.Tensor) -> torch.Tensor:
+    def _by_columns(self, courses: Array, scaled: Array) -> Array:
         """S^T S by the columns."""
-        frames, causes = scaled.shape[:2]
-        white = self._side_by_side(torch.einsum("ctq,tqki->ktci", courses.reshape(-1, frames, causes), scaled))
+        frames, causes, count, _ = scaled.shape
+        move = self._white.of.moveaxis
+        columns = move(courses.reshape(-1, frames, causes), 1, 0) @ scaled.reshape(frames, causes, -1)
+        white = self._side_by_side(move(columns.reshape(frames, -1, count, 3), 2, 0))
         return white.T @ white
 
-    def _side_by_side(self, scaled: torch.Tensor) -> torch.Tensor:
+    def _side_by_side(self, scaled: Array) -> Array:
         """Whitened columns, (N, C), of scaled displacements at seen samples, (K, T, C, 3)."""
         return self._white.white(scaled).swapaxes(2, 3).reshape(-1, scaled.shape[2])
 
-    def _beside_nuisances(self, own: torch.Tensor, mine: torch.Tensor) -> torch.Tensor:
+    def _beside_nuisances(self, own: Array, mine: Array) -> Array:
         """Products S^T S, (C, C), less what nuisances take by S^T U, (C, M)."""
-        part = torch.linalg.solve_triangular(self._factor, mine.T, upper=False)
+        part = self._standing @ mine.T
         return own - part.T @ part
 
-    def _back(self, white: torch.Tensor) -> torch.Tensor:
+    def _back(self, white: Array) -> Array:
         """W^T, but for scale and ways, of whitened vectors (N, D) that know nothing of unseen samples, (T, 3 K, D)."""
         count, frames = self._white.mask.shape
-        found = torch.empty((frames, 3 * count, white.shape[1]), dtype=white.dtype, device=white.device)
+        found, move = [], self._white.of.moveaxis
         for first in range(0, white.shape[1], SIDE_BY_SIDE):
-            some = slice(first, first + SIDE_BY_SIDE)
-            field = self._white.back(white[:, some].reshape(count, frames, -1)).reshape(count, frames, 3, -1)
-            found[:, :, some] = field.permute(1, 0, 2, 3).reshape(frames, 3 * count, -1)
-        return found
+            some = white[:, first : first + SIDE_BY_SIDE].reshape(count, frames, -1)
+            field = self._white.back(some).reshape(count, frames, 3, -1)
+            found.append(move(field, 1, 0).reshape(frames, 3 * count, -1))
+        return self._white.of.concatenate(found, 2)
 
     @cached_property
     def _white(self) -> DeviceWhitener:
         return DeviceWhitener(self.whiten, self.device)
 
     @cached_property
-    def _columns(self) -> torch.Tensor:
+    def _columns(self) -> Array:
         """U, (N, M)."""
         return self._white.on(self.space.columns)
 
     @cached_property
-    def _factor(self) -> torch.Tensor:
-        """Lower Cholesky factor of 1 + U^T U."""
+    def _standing(self) -> Array:
+        """L^-1 of the lower Cholesky factor of 1 + U^T U, (M, M)."""
         gram = self._columns.T @ self._columns
-        return torch.linalg.cholesky(gram + torch.eye(len(gram), dtype=gram.dtype, device=gram.device))
+        linear = self._white.of.linalg
+        return linear.inv(linear.cholesky(gram + self._white.on(np.eye(len(gram)))))
 
     @cached_property
-    def _nuisances(self) -> torch.Tensor:
+    def _nuisances(self) -> Array:
         """W^T U, (T, 3 K, M)."""
         return self._back(self._columns)
 
     @cached_property
-    def _unseen(self) -> torch.Tensor:
+    def _unseen(self) -> Array:
         """W^T of what samples that are not seen become, of one axis, (T, K, L)."""
         lost = self._white.lost.reshape(*self._white.mask.shape, -1)
-        return self._white.back(lost).swapaxes(0, 1).contiguous()
+        return self._white.back(lost).swapaxes(0, 1)
 
     @cached_property
-    def _seen(self) -> torch.Tensor:
+    def _seen(self) -> Array:
         return self._white.on(self.seen)
 
-
-def _over_time(courses: torch.Tensor, pairs: torch.Tensor) -> torch.Tensor:
-    """Sum over frames of products of fields, (T, Q, Q), with courses, (C, T Q), (C, C)."""
-    frames, causes, _ = pairs.shape
-    half = torch.einsum("ctq,tqr->ctr", courses.reshape(-1, frames, causes), pairs)
-    return half.flatten(1) @ courses.T
+    def _over_time(self, courses: Array, pairs: Array) -> Array:
+        """Sum over frames of products of fields, (T, Q, Q), with courses, (C, T Q), (C, C)."""
+        frames, causes, _ = pairs.shape
+        move = self._white.of.moveaxis
+        half = move(move(courses.reshape(-1, frames, causes), 1, 0) @ pairs, 1, 0)
+        return half.reshape(len(courses), -1) @ courses.T

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import torch
 
 from surgisim.diagnosis import benchmark
 from surgisim.diagnosis.answers import Answers, each, side_by_side
@@ -13,6 +12,7 @@ from surgisim.diagnosis.sight import Sight
 from surgisim.recordings.ways import turned
 
 POINTS, FRAMES, STATES = 25, 30, 4
+NUMPY_AND_TORCH = ("cpu", "cpu:0")
 
 
 def noise(rng: np.random.Generator, turned: bool) -> Noise:
@@ -30,14 +30,15 @@ def answers(rng: np.random.Generator) -> Answers:
     return side_by_side([pushes, waves])
 
 
+@pytest.mark.parametrize("device", NUMPY_AND_TORCH)
 @pytest.mark.parametrize("unseen", [0.0, 0.15])
 @pytest.mark.parametrize("turned", [False, True])
-def test_products_of_fields_with_courses_are_those_of_their_columns(unseen, turned):
+def test_products_of_fields_with_courses_are_those_of_their_columns(unseen, turned, device):
     rng = np.random.default_rng(3)
     seen = rng.uniform(size=(POINTS, FRAMES)) >= unseen
     whiten = whitener(noise(rng, turned), 0.02 * rng.standard_normal((POINTS, 3)), seen)
     nuisances = 3e-4 * rng.standard_normal((7, POINTS, FRAMES, 3))
-    sight = Sight(whiten, metric(whiten(nuisances).T), seen)
+    sight = Sight(whiten, metric(whiten(nuisances).T), seen, device)
     residuals = whiten(2e-4 * rng.standard_normal((4, POINTS, FRAMES, 3))).T.astype(np.float32)
     left, tried = sight.of(residuals), answers(rng)
     assert tried.columns.shape == (len(tried), POINTS, FRAMES, 3) == (18, POINTS, FRAMES, 3)
@@ -62,13 +63,14 @@ def test_columns_go_cause_by_cause_and_part_by_part():
     np.testing.assert_allclose(both.columns[6:], 2 * columns[[0, 3]])
 
 
+@pytest.mark.parametrize("device", NUMPY_AND_TORCH)
 @pytest.mark.parametrize("kind", [np.float32, float])
-def test_a_device_whitens_as_numpy_does(kind):
+def test_a_device_whitens_as_numpy_does(kind, device):
     rng = np.random.default_rng(5)
     seen = rng.uniform(size=(POINTS, FRAMES)) >= 0.15
     whiten = whitener(noise(rng, True), 0.02 * rng.standard_normal((POINTS, 3)), seen)
     fields = (3e-4 * rng.standard_normal((2, 3, POINTS, FRAMES, 3))).astype(kind)
-    there = DeviceWhitener(whiten, "cpu", torch.float32 if kind is np.float32 else torch.float64)
+    there = DeviceWhitener(whiten, device, np.dtype(kind).name)
     found, wanted = there.of_fields(turned(fields, whiten.ways)), whiten(fields)
     assert found.dtype == wanted.dtype == kind
     np.testing.assert_allclose(found, wanted, atol=(2e-5 if kind is np.float32 else 1e-6) * np.abs(wanted).max())
