@@ -40,16 +40,16 @@ def test_products_of_fields_with_courses_are_those_of_their_columns(unseen, turn
     nuisances = 3e-4 * rng.standard_normal((7, POINTS, FRAMES, 3))
     sight = Sight(whiten, metric(whiten(nuisances).T), seen, device)
     residuals = whiten(2e-4 * rng.standard_normal((4, POINTS, FRAMES, 3))).T.astype(np.float32)
-    left, tried = sight.of(residuals), answers(rng)
-    assert tried.columns.shape == (len(tried), POINTS, FRAMES, 3) == (18, POINTS, FRAMES, 3)
-    for few, many in zip(sight.products(tried, left), sight.products(tried.columns, left), strict=True):
-        np.testing.assert_allclose(few, many, rtol=0, atol=1e-7 * np.abs(many).max())
-    white = whiten(tried.columns).T
-    many = sight.products(tried.columns, left)
-    np.testing.assert_allclose(many.gram, sight.space.gram(white, white), rtol=0, atol=1e-5 * np.abs(many.gram).max())
-    np.testing.assert_allclose(
-        many.shadow, sight.space.gram(white, residuals), rtol=0, atol=1e-5 * np.abs(many.shadow).max()
-    )
+    left, mixed = sight.of(residuals), answers(rng)
+    # As many columns as make pairs of frames the cheaper way.
+    pushes = each(mixed.states[:3], mixed.share, rng.uniform(0, 1, (14, FRAMES)))
+    assert [tried.columns.shape for tried in (mixed, pushes)] == [(count, POINTS, FRAMES, 3) for count in (18, 42)]
+    for tried in (mixed, pushes):
+        many, white = sight.products(tried.columns, left), whiten(tried.columns).T
+        for a, b in zip(sight.products(tried, left), many, strict=True):
+            np.testing.assert_allclose(a, b, rtol=0, atol=1e-7 * np.abs(b).max())
+        for a, b in ((many.gram, white), (many.shadow, residuals)):
+            np.testing.assert_allclose(a, sight.space.gram(white, b), rtol=0, atol=1e-5 * np.abs(a).max())
 
 
 def test_columns_go_cause_by_cause_and_part_by_part():
