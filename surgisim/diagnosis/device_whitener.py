@@ -60,15 +60,15 @@ class DeviceWhitener:
 
     def of_fields(self, fields: np.ndarray) -> np.ndarray:
         """Of fields along each point's own axes [m], (..., K, T, 3), as (..., K T 3)."""
-        flat = fields.reshape(-1, *fields.shape[-3:])
-        found = np.empty((len(flat), flat[0].size), fields.dtype)
+        count, size = (int(np.prod(shape)) for shape in (fields.shape[:-3], fields.shape[-3:]))
+        flat, found = fields.reshape(count, *fields.shape[-3:]), np.empty((count, size), fields.dtype)
         for first in range(0, len(flat), AT_ONCE):
             some = slice(first, first + AT_ONCE)
             with self.turn():
                 scaled = self.on(flat[some]) * self.scale[:, None] * self.mask[..., None]
                 white = self.of.moveaxis(self.white(self.of.moveaxis(scaled, 0, 2)), 2, 0)
                 found[some] = self.off(white.reshape(len(scaled), -1))
-        return found.reshape(*fields.shape[:-3], -1)
+        return found.reshape(*fields.shape[:-3], size)
 
     def white(self, scaled: Array) -> Array:
         """(M, T, ...) of scaled displacements, (K, T, ...), zero where a sample is not seen."""

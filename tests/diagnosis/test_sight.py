@@ -75,6 +75,7 @@ def test_a_device_whitens_as_numpy_does(kind, device):
     assert found.dtype == wanted.dtype == kind
     np.testing.assert_allclose(found, wanted, atol=(2e-5 if kind is np.float32 else 1e-6) * np.abs(wanted).max())
     np.testing.assert_allclose(there.of_fields(turned(fields, whiten.ways)[0, 0]), found[0, 0], atol=1e-5)
+    assert there.of_fields(fields[:0]).shape == whiten(fields[:0]).shape == (0, 3, fields[0, 0].size)
 
 
 def test_the_benchmark_compares_the_same_products():
