@@ -10,6 +10,7 @@ from surgisim.diagnosis import calibration, nuisance
 from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
+from surgisim.diagnosis.foretold import ByBase
 from surgisim.diagnosis.metric import Metric, metric, products
 from surgisim.diagnosis.noise import Noise, Whitener
 from surgisim.diagnosis.nuisance import Group, positions, release, span
@@ -142,6 +143,11 @@ class Case:
     def prospect(self) -> Prospect | None:
         """What frames held out say of a prediction; None where there are none."""
         return prospect(self)
+
+    @cached_property
+    def by_base(self) -> ByBase:
+        """What the base's numbers do in frames held out."""
+        return ByBase(self)
 
     @property
     def overstretched(self) -> bool:

@@ -16,6 +16,7 @@ from surgisim.diagnosis.candidates import Parts, costly
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.context import Case, nulls, workers
 from surgisim.diagnosis.evidence import Finding, Scores, by_law
+from surgisim.diagnosis.foretold import foretold, of_base
 from surgisim.diagnosis.joint import Joint, fit_jointly, needed
 from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
 from surgisim.diagnosis.memo import Memo
@@ -133,8 +134,9 @@ def unheard(case: Case, laws: Scores, ranked: list[str], refits: list[Refit], pr
     None of a video, whose guessed body is off by more than that."""
     if case.prospect is None or judgement.guessed(case):
         return []
-    ahead = case.prospect.gain(case.base.simulated, case.base.simulated + refits[0].response)
-    if refits[0].log_evidence >= calibration.CLEAR and not ahead.refuted:
+    first = refits[0]
+    ahead = case.prospect.gain(of_base(case), foretold(case, [first], case.base.simulated + first.response))
+    if first.log_evidence >= calibration.CLEAR and not ahead.refuted:
         return []
     known = {r.term for r in refits}
     others = [t for t in ranked if t not in known and laws[t].best.gain > calibration.SOME]

@@ -16,6 +16,7 @@ from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.context import Case
 from surgisim.diagnosis.errors import as_filmed, bootstrap, noise_floor, residual, rms, taken_off
 from surgisim.diagnosis.evidence import Scores, best
+from surgisim.diagnosis.foretold import foretold, of_base
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint, least, prediction
 from surgisim.diagnosis.noise import Noise
@@ -159,7 +160,7 @@ def _explanation(case: Case, fitted: Joint) -> Explanation:
 
 
 def _judged_ahead(case: Case, fitted: Joint) -> Explanation:
-    ahead = None if case.prospect is None else case.prospect.gain(case.base.simulated, fitted.moved)
+    ahead = None if case.prospect is None else case.prospect.gain(of_base(case), foretold(case, fitted.refits, fitted.moved))
     out = max((out for out, _ in pushes(case.clip.recording, fitted.refits)), default=None)
     low, high = bootstrap(case, case.base.simulated, fitted.moved)
     falls, rises = low is not None and low > 0, high is not None and high < 0

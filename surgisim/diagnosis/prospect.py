@@ -6,7 +6,9 @@ that were fitted, is that of all less that of the fitted ones:
     2 log p(held out | fitted) = const - (chi square of all frames - chi square of the fitted ones)
 
 So a camera that drifts on, a point's constant, or a release whose moment nobody saw costs no prediction anything: what
-the fitted frames and the prior allow is allowed.
+the fitted frames and the prior allow is allowed. So is what a prediction's own numbers may be after the fit, the base's
+and the law's strength: directions W of the frames held out, each at one standard deviation (`Foretold.ways`), which
+give chi square a(1 + W^T W)^-1 a in return, a = <W, residual>, and cost log det(1 + W^T W).
 """
 
 from dataclasses import dataclass
@@ -26,8 +28,19 @@ SHOWS = 25.0
 
 
 @dataclass(frozen=True)
+class Foretold:
+    """A prediction of the whole clip."""
+
+    moved: np.ndarray
+    """[m], (K, T, 3)."""
+    ways: np.ndarray
+    """How it moves with its numbers, independent ones, each by a standard deviation of what the fitted frames leave
+    open [m], (C, K, T, 3); nothing in those."""
+
+
+@dataclass(frozen=True)
 class Gain:
-    """What one prediction gains over another, in chi square, with the 90 % interval of a bootstrap."""
+    """What one prediction gains over another, in twice the log likelihood, with the 90 % interval of a bootstrap."""
 
     value: float
     low: float
@@ -71,21 +84,33 @@ class Prospect:
         count = len(self.misfit(np.zeros_like(self.moved)))
         return rng.multinomial(count, np.full(count, 1 / count), DRAWS)
 
-    def misfit(self, field: np.ndarray) -> np.ndarray:
-        """Chi square of the frames held out, given the fitted ones: of each pattern over the points and stretch, (N,).
+    def misfit(self, field: np.ndarray, ways: np.ndarray | None = None) -> np.ndarray:
+        """Minus twice the log likelihood of the frames held out, given the fitted ones, less what noise alone costs:
+        of each pattern over the points and stretch, (N,).
 
-        field: a residual [m], (K, T, 3). Stretches, because what acts everywhere is one pattern's affair alone.
+        field: a residual [m], (K, T, 3); ways: as a `Foretold` has them. Stretches, because what acts everywhere is
+        one pattern's affair alone.
         """
-        parts = self._parts(self.whiten_all(field), self.space_all)
+        white, price = self.whiten_all(field), 0.0
+        if ways is not None and len(ways):
+            open_to = self.whiten_all(ways).T
+            told = np.eye(len(ways)) + self.space_all.gram(open_to, open_to)
+            likely = np.linalg.solve(told, self.space_all.gram(open_to, white[:, None])[:, 0])
+            white = white - open_to @ likely
+            price = float(likely @ likely + np.linalg.slogdet(told)[1])
+        parts = self._parts(white, self.space_all)
         parts[:, : self.until] -= self._parts(self.whiten(field[:, : self.until]), self.space)
-        return np.add.reduceat(parts, np.arange(0, parts.shape[1], STRETCH), axis=1).ravel()
+        found = np.add.reduceat(parts, np.arange(0, parts.shape[1], STRETCH), axis=1).ravel()
+        return found + price / len(found)
 
-    def gain(self, before: np.ndarray, after: np.ndarray) -> Gain:
-        """Of one prediction over another [m], (K, T, 3)."""
-        parts = self.misfit(self.moved - before) - self.misfit(self.moved - after)
+    def gain(self, before: Foretold, after: Foretold) -> Gain:
+        """Of one prediction over another."""
+        parts = self.misfit(self.moved - before.moved, before.ways) - self.misfit(self.moved - after.moved, after.ways)
         drawn = self.draws @ parts
         low, high = np.quantile(drawn, [0.05, 0.95])
-        return Gain(float(parts.sum()), float(low), float(high), float(self.misfit(after - before).sum()))
+        nothing = np.zeros_like(before.moved)
+        right = self.misfit(after.moved - before.moved, before.ways) - self.misfit(nothing, after.ways)
+        return Gain(float(parts.sum()), float(low), float(high), float(right.sum()))
 
     def _parts(self, white: np.ndarray, space: Metric) -> np.ndarray:
         """Of each pattern and frame, (M, T)."""
