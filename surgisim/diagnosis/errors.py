@@ -51,6 +51,18 @@ def as_filmed(case, simulated: np.ndarray) -> np.ndarray:
     return simulated
 
 
+def beside_nuisances(case, simulated: np.ndarray) -> np.ndarray:
+    """A prediction with everything that may be beside it, where that is likeliest in the fitted frames, and as it was in
+    those held out [m], (K, T, 3)."""
+    until = case.clip.until
+    likely = case.space.likely(case.whiten((case.clip.moved - simulated)[:, :until]))
+    result, at = simulated.copy(), 0
+    for columns in (*(group.columns[:, :, :until] for group in case.groups), case.base.slopes):
+        result[:, :until] += np.tensordot(likely[at : at + len(columns)], columns, 1)
+        at += len(columns)
+    return result
+
+
 def rms(case, simulated) -> tuple[float, float | None]:
     """On fitted frames and on those held out [mm]."""
     left, until = residual(case, simulated), case.clip.until

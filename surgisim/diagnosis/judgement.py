@@ -14,7 +14,7 @@ from scipy.special import expit
 from surgisim.diagnosis import calibration, candidates
 from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.context import Case
-from surgisim.diagnosis.errors import as_filmed, bootstrap, noise_floor, residual, rms, taken_off
+from surgisim.diagnosis.errors import as_filmed, beside_nuisances, bootstrap, noise_floor, residual, rms, taken_off
 from surgisim.diagnosis.evidence import Scores, best
 from surgisim.diagnosis.foretold import foretold, of_base
 from surgisim.diagnosis.hypothesis import Hypothesis
@@ -434,14 +434,14 @@ def noise_beside(case: Case, after: np.ndarray) -> Noise:
 
 
 def borne_out(case: Case, after: np.ndarray) -> float:
-    """How much of what a prediction changes the plain error of the fitted frames bears out, camera and video aside.
+    """How much of what a prediction changes the plain error of the fitted frames bears out, nuisances aside.
 
-    By how much its mean square falls, over that of the change: 1 where what is added is there (more where it is there
-    more strongly), -1 where nothing of the kind is, whatever noise and camera are taken to do in directions that they
-    hardly reach.
+    By how much its mean square falls, over that of the change, each beside the nuisances that are likeliest with it: 1
+    where what is added is there (more where it is there more strongly), -1 where nothing of the kind is, whatever noise
+    is taken to do in directions that it hardly reaches.
     """
     until = case.clip.until
-    both = (as_filmed(case, s) for s in (case.base.simulated, after))
+    both = (beside_nuisances(case, s) for s in (case.base.simulated, after))
     before, left = (residual(case, s, False, rest_only=False)[:, :until] for s in both)
     change = float(((before - left) ** 2).sum())
     return float((before**2).sum() - (left**2).sum()) / change if change > 0 else -1.0

@@ -18,6 +18,7 @@ from surgisim.diagnosis.foretold import foretold
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint
 from surgisim.diagnosis.judgement import (
+    Explanation,
     Judgement,
     cos,
     explainable,
@@ -121,6 +122,7 @@ def write(
             "nuisance_ratio": case.nuisance_ratio,
             **_shares(said_of),
             "spacing": {"value": float(1e3 * shown.clip.body.spacing), "unit": "mm"},
+            "weighed": [_weighed(e) for e in tried],
             "beside": None if fitted is None or fitted.beside is None else _beside(case, fitted.beside),
         },
         residual={} if unnamed is None else unnamed.told,
@@ -157,6 +159,13 @@ def _shares(said_of: Judgement) -> dict:
         return told
     ahead = None if chosen.ahead is None else vars(chosen.ahead)
     return told | {"gain": chosen.fitted.gain, "left": chosen.left, "outward": chosen.outward, "held_out": ahead}
+
+
+def _weighed(tried: Explanation) -> dict:
+    """One of the explanations that may be named, in numbers."""
+    ahead = None if tried.ahead is None else vars(tried.ahead)
+    laws = [r.term for r in tried.fitted.refits]
+    return {"laws": laws, "log_evidence": tried.log_evidence, "left": tried.left, "held_out": ahead}
 
 
 def beside_placebo(case, fitted: Joint, wrong: Joint | None) -> Replay:

@@ -232,6 +232,11 @@ def test_the_plain_error_bears_out_what_is_there_and_nothing_else(case):
     assert borne_out(there, base + 0.5 * bump) > 2.0
     assert borne_out(case, base + bump) == pytest.approx(-1.0, abs=0.4)
     assert borne_out(case, base) == -1.0
+    # Beside a grip that is larger by three standard deviations, which is far more than what is there.
+    (wide,) = (3 * g.columns[0] for g in case.groups if g.name == "grip radius")
+    assert (wide[:, : clip.until] ** 2).sum() > 10 * (bump[:, : clip.until] ** 2).sum()
+    both = replace(there, clip=replace(clip, moved=there.clip.moved + wide * clip.seen[..., None]))
+    assert borne_out(both, base + bump) == pytest.approx(1.0, abs=0.4)
 
 
 def test_laws_owe_what_the_base_loses_where_the_camera_may_drift_less(case):
