@@ -11,7 +11,7 @@ from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.foretold import ByBase
-from surgisim.diagnosis.metric import Metric, metric, products
+from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener
 from surgisim.diagnosis.nuisance import Group, positions, release, span
 from surgisim.diagnosis.perceived import OF_TRACKS
@@ -90,8 +90,7 @@ class Case:
 
     @cached_property
     def _products(self) -> tuple[np.ndarray, np.ndarray]:
-        # Of a camera that may go a hundred times as far, rounding to single precision is more than what noise leaves.
-        return products(self.space.columns, self.space.columns), self.space.seen_through(self.z)
+        return self.space.own, self.space.seen_through(self.z)
 
     def open_by(self, name: str, times: float | np.ndarray) -> "Case":
         """The same with the prior of one kind of nuisance some times as wide, or of each of its directions, (C,)."""

@@ -114,8 +114,7 @@ class Prospect:
 
     def _parts(self, white: np.ndarray, space: Metric) -> np.ndarray:
         """Of each pattern and frame, (M, T)."""
-        cleared = space.cleared(white[:, None])[:, 0].astype(float)
-        return (white * cleared).reshape(len(self.whiten.scale), -1, 3).sum(2)
+        return (white * space.cleared(white)).reshape(len(self.whiten.scale), -1, 3).sum(2)
 
 
 def prospect(case) -> Prospect | None:

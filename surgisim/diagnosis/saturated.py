@@ -36,8 +36,9 @@ class Saturated:
 
     field: np.ndarray
     """Of one component, (M, K, T_fit)."""
-    cleared: np.ndarray
-    """Whitened, and cleared by the metric, (N, 3 M) float32."""
+    white: np.ndarray
+    """Along each axis, whitened, (N, 3 M) float32."""
+    space: Metric
     gram: np.ndarray
     """(3 M, 3 M)"""
     by_chance: float
@@ -47,8 +48,7 @@ class Saturated:
 
     def fit(self, z: np.ndarray) -> SmoothFit:
         """To a whitened residual (N,)."""
-        shadow = (self.cleared.T @ z.astype(np.float32)).astype(float)[:, None]
-        x, gains = _fitted(self.gram, shadow)
+        x, gains = _fitted(self.gram, _shadow(self.white, self.space, z[:, None]))
         parts = x.reshape(3, len(self.field))
         return SmoothFit(
             float(gains[0]) - self.by_chance, np.einsum("em,mkt->kte", parts, self.field, optimize=True), self.slack
@@ -59,10 +59,15 @@ def saturated(clip: Clip, whiten: Whitener, space: Metric, nulls: np.ndarray) ->
     """The fields of a clip; nulls: residuals of nothing, (N, D)."""
     field = np.einsum("km,bt->mbkt", _patterns(clip), _courses(clip.until)).reshape(-1, len(clip.rest), clip.until)
     white = whiten(np.concatenate([field[..., None] * e for e in np.eye(3)])).T.astype(np.float32)
-    gram, cleared = space.gram(white, white), space.cleared(white)
-    _, gains = _fitted(gram, (cleared.T @ nulls.astype(np.float32)).astype(float))
+    gram = space.gram(white, white)
+    _, gains = _fitted(gram, _shadow(white, space, nulls))
     by_chance = float(gains.mean())
-    return Saturated(field, cleared, gram, by_chance, float(np.quantile(gains, 0.95)) - by_chance)
+    return Saturated(field, white, space, gram, by_chance, float(np.quantile(gains, 0.95)) - by_chance)
+
+
+def _shadow(white: np.ndarray, space: Metric, residuals: np.ndarray) -> np.ndarray:
+    """Products with residuals (N, D) under the metric, (3 M, D)."""
+    return (white.T @ space.cleared(residuals).astype(np.float32)).astype(float)
 
 
 def _fitted(gram: np.ndarray, shadow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from surgisim.diagnosis.answers import Answers
 from surgisim.diagnosis.device_whitener import Array, DeviceWhitener
@@ -144,9 +145,7 @@ class Sight:
     @cached_property
     def _standing(self) -> Array:
         """L^-1 of the lower Cholesky factor of 1 + U^T U, (M, M)."""
-        gram = self._columns.T @ self._columns
-        linear = self._white.of.linalg
-        return linear.inv(linear.cholesky(gram + self._white.on(np.eye(len(gram)))))
+        return self._white.on(solve_triangular(self.space.factor[0], np.eye(len(self.space.own)), trans=1))
 
     @cached_property
     def _nuisances(self) -> Array:
