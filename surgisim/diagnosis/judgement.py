@@ -95,11 +95,17 @@ class Explanation:
         )
 
     @property
+    def as_promised(self) -> bool:
+        """Whether fitted frames leave no doubt and those held out gain about what it promises: where that is little
+        more than noise makes, no interval of it can be expected to lie above nothing."""
+        sure = self.log_evidence >= calibration.CERTAIN and self.ahead is not None
+        return sure and self.ahead.value >= calibration.HALF * self.ahead.expected
+
+    @property
     def foretold(self) -> bool:
         """Whether fitted frames leave no doubt and those held out gain by it about what it promises: then a plain
         error, of which a camera that walks is most, need not fall as far."""
-        sure = self.log_evidence >= calibration.CERTAIN and self.ahead is not None and self.ahead.confirmed
-        return sure and self.ahead.value >= calibration.HALF * self.ahead.expected
+        return self.as_promised and self.ahead.confirmed
 
     @property
     def visible(self) -> bool:
@@ -306,7 +312,7 @@ def _reason(
     if doubt:
         # What is not believed says that something is hidden only where that is certain.
         return doubt if certain else "faint"
-    if chosen.visible and not chosen.confirmed:
+    if chosen.visible and not (chosen.confirmed or chosen.as_promised):
         return "unconfirmed"
     if not (chosen.visible or chosen.confirmed or clear) and held < calibration.SURE:
         # The fitted frames alone speak, and not for it alone.

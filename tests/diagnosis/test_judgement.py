@@ -206,6 +206,16 @@ def test_a_law_beyond_doubt_that_foretells_as_much_as_it_promises_need_not_be_bo
     assert said(0.5 * BORNE_OUT, ahead=BLIND) == "unbacked"
 
 
+def test_a_law_beyond_doubt_is_named_where_little_that_it_promises_comes():
+    def said(ahead: Gain, evidence: float = CERTAIN) -> str:
+        return reason(explanation(evidence=evidence, ahead=ahead))
+
+    kept, missed = Gain(31.0, -4.0, 70.0, 32.0), Gain(12.0, -23.0, 51.0, 32.0)
+    assert said(kept) == "named"
+    assert said(kept, CERTAIN - 1) == "unconfirmed"
+    assert said(missed) == "unconfirmed"
+
+
 def test_what_only_frames_held_out_speak_for_is_not_named():
     much = Gain(60.0, 2.0, 110.0, 60.0)
     assert reason(explanation(evidence=TRIED - 1, ahead=much)) == "faint"
