@@ -51,15 +51,20 @@ def as_filmed(case, simulated: np.ndarray) -> np.ndarray:
     return simulated
 
 
-def beside_nuisances(case, simulated: np.ndarray) -> np.ndarray:
+def beside_nuisances(case, simulated: np.ndarray, whole: bool = False) -> np.ndarray:
     """A prediction with everything that may be beside it, where that is likeliest in the fitted frames, and as it was in
-    those held out [m], (K, T, 3)."""
-    until = case.clip.until
-    likely = case.space.likely(case.whiten((case.clip.moved - simulated)[:, :until]))
+    those held out; or in all frames, where `whole` and any are held out [m], (K, T, 3)."""
+    left, ahead = case.clip.moved - simulated, case.prospect if whole else None
+    if ahead is None:
+        likely, span = case.space.likely(case.whiten(left[:, : case.clip.until])), slice(0, case.clip.until)
+    else:
+        likely, span = ahead.space_all.likely(ahead.whiten_all(left)), slice(0, case.clip.frames)
     result, at = simulated.copy(), 0
-    for columns in (*(group.columns[:, :, :until] for group in case.groups), case.base.slopes):
-        result[:, :until] += np.tensordot(likely[at : at + len(columns)], columns, 1)
-        at += len(columns)
+    for group in case.groups:
+        result[:, span] += np.tensordot(likely[at : at + len(group.columns)], group.columns[:, :, span], 1)
+        at += len(group.columns)
+    slopes = case.base.slopes
+    result[:, : case.clip.until] += np.tensordot(likely[at : at + len(slopes)], slopes, 1)
     return result
 
 

@@ -44,7 +44,7 @@ class Explanation:
     outward: float | None
     """How far a push among its laws points out of the tissue (contact.py); None without one."""
     falls: bool = False
-    """Whether the plain error of the frames held out falls with it by more than its interval."""
+    """Whether the plain error of the frames held out, nuisances aside, falls with it by more than its interval."""
     rises: bool = False
     """Whether it rises by more than that."""
     may_leave: float = calibration.PUSH_LEAVES
@@ -168,7 +168,8 @@ def _explanation(case: Case, fitted: Joint) -> Explanation:
 def _judged_ahead(case: Case, fitted: Joint) -> Explanation:
     ahead = None if case.prospect is None else case.prospect.gain(of_base(case), foretold(case, fitted.refits, fitted.moved))
     out = max((out for out, _ in pushes(case.clip.recording, fitted.refits)), default=None)
-    low, high = bootstrap(case, case.base.simulated, fitted.moved)
+    both = (beside_nuisances(case, s, whole=True) for s in (case.base.simulated, fitted.moved))
+    low, high = bootstrap(case, *both)
     falls, rises = low is not None and low > 0, high is not None and high < 0
     if guessed(case):
         # A guessed body is off by as much as noise everywhere: only beyond that a rise says something.

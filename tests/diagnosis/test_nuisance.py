@@ -14,7 +14,7 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import diagnose, nuisance, perceived
 from surgisim.diagnosis.base import Known, carried, displacement_gradient, tracks_of
 from surgisim.diagnosis.diagnose import whitened
-from surgisim.diagnosis.errors import as_filmed, rms
+from surgisim.diagnosis.errors import as_filmed, beside_nuisances, bootstrap, rms
 from surgisim.diagnosis.evidence import Finding, Score
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.judgement import borne_out
@@ -222,6 +222,10 @@ def test_what_the_camera_did_is_no_misfit(case):
     assert aside == pytest.approx(still, rel=0.15)
 
 
+def columns(case) -> np.ndarray:
+    return np.concatenate([g.columns for g in case.groups])
+
+
 def test_the_plain_error_bears_out_what_is_there_and_nothing_else(case):
     clip, base = case.clip, case.base.simulated
     across = clip.rest[:, 0] / np.ptp(clip.rest[:, 0])
@@ -237,6 +241,16 @@ def test_the_plain_error_bears_out_what_is_there_and_nothing_else(case):
     assert (wide[:, : clip.until] ** 2).sum() > 10 * (bump[:, : clip.until] ** 2).sum()
     both = replace(there, clip=replace(clip, moved=there.clip.moved + wide * clip.seen[..., None]))
     assert borne_out(both, base + bump) == pytest.approx(1.0, abs=0.4)
+    # So do frames held out, where a nuisance hides it from the plain error itself.
+    later = bump[:, clip.until :] * clip.seen[:, clip.until :, None]
+    size, *overlaps = ((c[:, clip.until :] * later).sum() for c in (bump, *columns(case)))
+    most = int(np.abs(overlaps).argmax())
+    hidden = -2 * size / overlaps[most] * columns(case)[most]
+    against = replace(there, clip=replace(clip, moved=there.clip.moved + hidden * clip.seen[..., None]))
+    plain = bootstrap(against, base, base + bump)
+    beside = bootstrap(against, *(beside_nuisances(against, s, whole=True) for s in (base, base + bump)))
+    assert sum(plain) < 0
+    assert beside[0] > 0.5 * plain[0]
 
 
 def test_laws_owe_what_the_base_loses_where_the_camera_may_drift_less(case):
