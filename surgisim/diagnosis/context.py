@@ -9,8 +9,8 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, nuisance
 from surgisim.diagnosis.base import Base
 from surgisim.diagnosis.clip import Clip
-from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.foretold import ByBase
+from surgisim.diagnosis.memo import Memo
 from surgisim.diagnosis.metric import Metric, metric
 from surgisim.diagnosis.noise import Noise, Whitener
 from surgisim.diagnosis.nuisance import Group, positions, release, span

@@ -52,8 +52,8 @@ def as_filmed(case, simulated: np.ndarray) -> np.ndarray:
 
 
 def beside_nuisances(case, simulated: np.ndarray, whole: bool = False) -> np.ndarray:
-    """A prediction with everything that may be beside it, where that is likeliest in the fitted frames, and as it was in
-    those held out; or in all frames, where `whole` and any are held out [m], (K, T, 3)."""
+    """A prediction with everything that may be beside it, at its likeliest, in the fitted frames, and as it was in
+    those held out; in all frames, where `whole` and any are held out [m], (K, T, 3)."""
     left, ahead = case.clip.moved - simulated, case.prospect if whole else None
     if ahead is None:
         likely, span = case.space.likely(case.whiten(left[:, : case.clip.until])), slice(0, case.clip.until)

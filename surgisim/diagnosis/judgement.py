@@ -166,7 +166,9 @@ def _explanation(case: Case, fitted: Joint) -> Explanation:
 
 
 def _judged_ahead(case: Case, fitted: Joint) -> Explanation:
-    ahead = None if case.prospect is None else case.prospect.gain(of_base(case), foretold(case, fitted.refits, fitted.moved))
+    ahead = None
+    if case.prospect is not None:
+        ahead = case.prospect.gain(of_base(case), foretold(case, fitted.refits, fitted.moved))
     out = max((out for out, _ in pushes(case.clip.recording, fitted.refits)), default=None)
     both = (beside_nuisances(case, s, whole=True) for s in (case.base.simulated, fitted.moved))
     low, high = bootstrap(case, *both)
