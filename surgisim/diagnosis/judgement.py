@@ -219,6 +219,9 @@ def judged(
             most = 0.45
         scale = min(1.0, most / max(max(chances.values()), 1e-12))
         chances = {t: scale * chance for t, chance in chances.items()}
+        if not chosen.enough:
+            # What the frames hardly speak for explains nothing that can be told from noise.
+            explained = 0.0
     # A law that is named beside another is as probable as that, not as it would be in the other's stead.
     chances |= {r.term: min(alone(r), chances[term]) for r in fitted.refits[1:]}
     after = fitted.moved if verdict != "unexplained" else case.base.simulated
