@@ -15,6 +15,8 @@ from surgisim.estimation.trial import at_once
 
 LEAST = 0.3
 """Share of a standard deviation that must lie within what is tried, for a secant [1]."""
+FINEST = 0.01
+"""Of a prior standard deviation: least step of a secant, so that it is no difference of rounding [1]."""
 
 
 def of_base(case) -> Foretold:
@@ -41,7 +43,7 @@ class ByBase:
     def __init__(self, case) -> None:
         clip, self.unit = case.clip, case.clip.prior.spread
         spread, vectors = np.linalg.eigh(self._scaled(case.base.known))
-        self.axes = vectors * np.sqrt(np.maximum(spread, 1e-12))
+        self.axes = vectors * np.sqrt(np.maximum(spread, FINEST**2))
         """Columns, one standard deviation each, in units of the prior's, (3, 3)."""
         self.fields = np.stack(at_once(lambda axis, _: self._secant(case, axis), list(self.axes.T), case.workers))
         """What each does [m], (3, K, T, 3)."""
