@@ -4,6 +4,8 @@ import threading
 
 import warp as wp
 
+from surgisim.side_by_side import threads
+
 GRAPH = 64
 """Steps that a CUDA graph holds at most: enough that starting it costs nothing."""
 
@@ -43,14 +45,20 @@ class March:
 
 
 def _launched(phases: Phases, steps: int) -> None:
-    """On a CPU: a second launch of a phase runs on a thread of its own, as a launch releases the interpreter's lock."""
-    crew = [_Hand() for _ in range(max(map(len, phases)) - 1)]
+    """On a CPU: a second launch of a phase runs on a thread of its own, as a launch releases the interpreter's lock.
+
+    A process that has one processor to itself launches them one after the other: handing over would have to wait until
+    the one that others keep busy is free.
+    """
+    crew = [_Hand() for _ in range(min(max(map(len, phases)), threads()) - 1)]
     try:
         for _ in range(steps):
             for phase in phases:
                 for hand, launch in zip(crew, phase[1:], strict=False):
                     hand.take(launch)
                 phase[0].launch()
+                for launch in phase[1 + len(crew) :]:
+                    launch.launch()
                 for hand, _launch in zip(crew, phase[1:], strict=False):
                     hand.wait()
     finally:

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize_scalar
 
 from surgisim.diagnosis.base import boldly, carried
 from surgisim.diagnosis.clip import Clip
@@ -18,6 +20,9 @@ FLOOR = 1e-4
 CREEPS, LEAST_SWINGS = (1.5, 8.0), 4.0
 """Time constants of creep, and how long a course must be for it to be told from a swing, in periods. Silicone sinks on
 for a second once it is let go; a modulus that makes up for that swings too slowly (of the beam by 2 %)."""
+HAND, LEAST_DELAY = 0.1, 1e-3
+"""How long after the first frame a body may still be held at most [s], and frames below which it is as good as at once;
+chosen: fingers open in less."""
 BETWEEN = 0.1
 """Share of frames between the first and the last seen one below which only where a body came to rest is seen."""
 
@@ -52,17 +57,17 @@ class Course:
 
     def left(self, moved: np.ndarray) -> np.ndarray:
         """Recorded less simulated [m], of what is seen, (M, 3); moved: (K, at least `until`, 3)."""
-        n = self.until
+        n, moved = self.until, self.let_go(moved)
         return (self.clip.moved[:, :n] - moved[:, :n])[self.seen[:, :n]]
 
     def squares(self, moved: np.ndarray) -> np.ndarray:
         """Squared distance of what is seen [m^2], (K, until); nothing where it is not."""
-        n = self.until
+        n, moved = self.until, self.let_go(moved)
         return np.where(self.seen[:, :n], ((self.clip.moved[:, :n] - moved[:, :n]) ** 2).sum(-1), 0.0)
 
     def weighted(self, moved: np.ndarray) -> np.ndarray:
         """The same times the frames' weights, less what each point may creep, (M, 3)."""
-        n, seen = self.until, self.seen[:, : self.until]
+        n, seen, moved = self.until, self.seen[:, : self.until], self.let_go(moved)
         left = np.where(seen[..., None], self.clip.moved[:, :n] - moved[:, :n], 0.0) * self.weight[:n, None]
         if n >= LEAST_SWINGS * self.period * self.clip.fps:
             slow = self.creep(n) * self.weight[:n, None]
@@ -70,6 +75,28 @@ class Course:
                 own = np.linalg.qr(slow * seen[k, :, None])[0]
                 left[k] -= own @ (own.T @ left[k])
         return left[seen]
+
+    def let_go(self, moved: np.ndarray) -> np.ndarray:
+        """The same displacement, (K, N, 3), from the moment on at which the hand lets go: a recording may begin before.
+
+        It is the one that suits the first swing best, of what is simulated too: a delay is no part of any law.
+        """
+        turn = turned(self.clip)
+        if self.clip.recording.starts != "released" or turn is None or comes_to_rest(self.clip):
+            return moved
+        n = min(self.until, 2 * turn + 1)
+        seen, frames = self.seen[:, :n], np.arange(moved.shape[1])
+        course = CubicSpline(frames, moved, axis=1)
+
+        def delayed(by: float, n: int) -> np.ndarray:
+            return course(np.maximum(frames[:n] - by, 0.0))
+
+        def off(by: float) -> float:
+            return float(((self.clip.moved[:, :n] - delayed(by, n))[seen] ** 2).sum())
+
+        latest = min(HAND * self.clip.fps, turn / 2)
+        by = minimize_scalar(off, bounds=(0.0, latest), method="bounded", options={"xatol": LEAST_DELAY / 10}).x
+        return moved if by < LEAST_DELAY or off(by) >= off(0.0) else delayed(by, len(frames))
 
     def creep(self, frames: int) -> np.ndarray:
         """How a body may sink further once it is let go, (frames, 2): softer than it swings, it takes its time."""
@@ -122,6 +149,11 @@ def turned(clip: Clip) -> int | None:
     step = np.sign(np.diff(path[k, :, a]))
     turns = 1 + np.flatnonzero(step[1:] * step[:-1] < 0)
     return int(turns[0]) if len(turns) else None
+
+
+def seen_period(clip: Clip) -> float:
+    """Of a swing as the recording shows it [s]: twice the time of the first turn; the whole clip where nothing turns."""
+    return 2 * (turned(clip) or clip.until / 2) / clip.fps
 
 
 def alike(clip: Clip, period: float) -> np.ndarray:

@@ -68,7 +68,7 @@ def diagnose_swinging(
     prior = prior_of(first.recording, SUREST)
     given = prior if first.recording.expected else None
     elastic, settles = settings.base == "elastic", all(courses.comes_to_rest(c) for c in clips)
-    rough = tuple(courses.fitted(c, np.inf if settles else _liveliest_period(c)) for c in clips)
+    rough = tuple(courses.fitted(c, np.inf if settles else courses.seen_period(c)) for c in clips)
     body, held = _held_out(Body(rough, elastic, settles, memo), held_out, settings)
     say = lambda text: progress(0.02, 1, text)  # noqa: E731
     numbers = fit_base(body, lambda x: slowest_period(first, x), given, say)
@@ -105,11 +105,6 @@ def same_body(first: Clip, others: Sequence[Clip]) -> None:
                 f"recordings {mine.name} and {theirs.name}: their {what} differ, but one body at rest in one frame of "
                 "reference is wanted. Give recordings of the same body."
             )
-
-
-def _liveliest_period(clip: Clip) -> float:
-    """As the recording shows it [s]: twice the time of the first turn; the whole clip where nothing turns round."""
-    return 2 * (courses.turned(clip) or clip.until / 2) / clip.fps
 
 
 def _held_out(body: Body, recording: Recording | None, settings: Diagnosing) -> tuple[Body, HeldOut]:

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from surgisim.diagnosis.base import HIGH, LOW, TERMS, values_on
 from surgisim.diagnosis.clip import Clip
 from surgisim.diagnosis.memo import NOTHING_KEPT, Memo
 from surgisim.diagnosis.prior import SPREAD, USUAL, Prior
-from surgisim.diagnosis.swinging.course import Course, simulate, turned
+from surgisim.diagnosis.swinging.course import Course, seen_period, simulate, turned
 from surgisim.diagnosis.swinging.law import Frame, Law
 from surgisim.estimation.identify import NINETY
 from surgisim.mpm.setup import Values
@@ -293,15 +293,27 @@ def try_law(law: Law, body: Body, base: np.ndarray, given: Prior | None, other: 
     if not np.isfinite(costs).any():
         return None
     y = starts[int(np.argmin(costs))]
+    if given is not None and nearest:
+        # Viscosity was told at the other recording's pitch; what loses as much in every swing has more at a slower one.
+        apart = abs(math.log(seen_period(body.clip) / frame.period))
+        given = replace(given, spread=np.hypot(given.spread, [0.0, 0.0, apart]))
     least, most = (end[[0, 2]][: 1 + nearest] - base[[0, 2]][: 1 + nearest] for end in bounds(given))
     low, high = np.concatenate([least, law.low]), np.concatenate([most, law.high])
     numbers = np.abs(y[1 + nearest :])
     size = np.concatenate([np.ones(1 + nearest), np.where(numbers > 0, numbers, NOUGHT)])
+
+    def beside(courses: Sequence[Course], begin: np.ndarray):
+        """What is left of courses beside how far the base is from what was told of it."""
+        count = independent(courses, frame.period)
+        unsure = np.full(1 + nearest, np.inf) if given is None else given.spread[[0, 2]][: 1 + nearest]
+        one = math.sqrt(float((left(begin, courses) ** 2).sum()) / count)
+        return lambda y: np.concatenate([left(y, courses).ravel(), one * y[: 1 + nearest] / unsure])
+
     try:
         alone = float((body.left(some, body.base(base, frame.period), {}) ** 2).sum())
-        y, fun, jac = descend(lambda y: left(y, some), y, size, low, high)
+        y, fun, jac = descend(beside(some, y), y, size, low, high)
         if not body.settles and float(fun @ fun) < HELPS * alone:
-            y, fun, jac = descend(lambda y: left(y, body.courses), y, size, low, high)
+            y, fun, jac = descend(beside(body.courses, y), y, size, low, high)
     except (Breakdown, Misplaced):
         return None
     spread_of = size * np.sqrt(np.diag(covariance(fun, jac, independent(body.courses, frame.period))))

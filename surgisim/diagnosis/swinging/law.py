@@ -9,8 +9,9 @@ from surgisim.diagnosis.clip import Clip
 from surgisim.mpm.setup import Values
 from surgisim.physics.place import Place
 
-EXTENT, SEAM = 0.05, 0.02
-"""Over the body's length: extent of what acts in one place, and how gradually one part passes into the other."""
+EXTENT, HUNG, SEAM = 0.05, 0.02, 0.02
+"""Over the body's length: extent of tissue that differs in one place, and of what is hung or pushes there, which at an
+end would otherwise act further in; how gradually one part passes into the other."""
 ALWAYS = {"onset": 0.0, "end": 60.0}
 ALONG = (0.0, 0.5)
 """Places of what acts in one place, from the free end (0) to what is held (1), that are tried before a fit."""
@@ -65,8 +66,8 @@ class Frame:
         x, y, z = self.free + float(share) * (self.held - self.free)
         return float(x), float(y), float(z)
 
-    def somewhere(self, share: float) -> Place:
-        return Place(self.along(share), EXTENT * self.length)
+    def somewhere(self, share: float, extent: float = EXTENT) -> Place:
+        return Place(self.along(share), extent * self.length)
 
 
 def frame_of(clip: Clip, x: np.ndarray, period: float) -> Frame:
@@ -80,7 +81,9 @@ def frame_of(clip: Clip, x: np.ndarray, period: float) -> Frame:
     reach = (rest - held) @ way
     end = rest[reach > reach.max() - body.spacing].mean(0)
     way = (end - held) / np.linalg.norm(end - held)
-    free = held + way * ((rest - held) @ way).max()
+    # Up to the face, half a particle beyond the last of them.
+    half = 0.5 * float(np.cbrt(np.median(body.volume)))
+    free = held + way * (((rest - held) @ way).max() + half)
     gravity = np.array(clip.recording.gravity or (0.0, 0.0, 0.0))
     size = float(np.linalg.norm(gravity))
     mass = float(clip.density * body.volume.sum())
