@@ -2,8 +2,9 @@
 
 What is seen is where it came to rest, so the points are seen in the first frame (straight, as it was cast) and in the
 last ones. The depth itself is not used: in it the two silicones, which touch, lie 28 mm apart at their seam. Used is
-the outline, whose midline lies in a plane nearly parallel to the picture, with the beam's own length as its measure:
-the bar between the two heads is 12 cm long, and stretches by less than 3 % under its own weight.
+the outline, whose midline lies in a plane nearly parallel to the picture, with the bar's own width as its measure: by
+it the free head is as wide as it was cast, and the last centimetre of the bar lies behind the edge of the clamp. The
+clamp holds the head alone, and not its first centimetre (the makers' h_em_c.exp: x > 7 cm).
 Arnavaz, Nielsen, Kry, Macklin and Erleben, Differentiable depth for real2sim calibration of soft body simulations,
 CGF 42 (2023); their mesh, in centimetres, with material 1 at x < 0 and material 2 beyond.
 """
@@ -25,8 +26,9 @@ START, BEGIN = np.array([704.0, 291.0]), np.radians(30.0)
 """A pixel on the midline near the clamp, and the bar's slope there."""
 VERTICAL = np.array([733 - 727, 362 - 205])
 """Along the clamp's left edge, downwards [px]."""
-BAR = 0.12
-"""Length of the bar [m], from x = 6 cm at the clamp to x = -6 cm at the free head."""
+BAR, WIDE, HELD = 0.12, 0.03, 0.07
+"""Length of the bar [m], from x = 6 cm at the clamp to x = -6 cm at the free head; its width; from which x on it is
+held."""
 STRIDE, TURN = 4.0, np.radians(np.arange(-12, 12.1, 1.5))
 """Steps along the midline [px], and by how much its direction may change in one."""
 WIDER = 1.35
@@ -44,16 +46,22 @@ GRAVITY = 9.81
 
 def hanging(depth: np.ndarray, tets: Path) -> Recording:
     """The beam as a recording; x along the cast bar from the free end to the clamp, y up. Depth (H, W) [m]."""
-    path = midline(outline(depth))
-    scale = BAR / _length(path)
+    path, width = midline(outline(depth))
+    scale = WIDE / width
     down = VERTICAL / np.linalg.norm(VERTICAL)
     out = np.array([-down[1], down[0]])
     away = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]) * scale
-    at = np.arange(APART, BAR - APART / 2, APART)
+    # Counted from the free head, which is seen; the edge of the clamp is where the bar begins to be.
+    edge = away[-1] - BAR / 2
     flat = (path - path[0]) * scale
-    along, fallen = (np.interp(at, away, flat @ axis) for axis in (out, down))
-    place = np.stack([BAR / 2 - at, 0 * at, 0 * at], 1)
-    rested = np.stack([BAR / 2 - along, -fallen, 0 * at], 1)
+    first = flat[np.searchsorted(away, 2 * APART)]
+    # Unseen it bends evenly from level where it is held to the slope with which it comes out.
+    slope, hidden = np.arctan2(first @ down, first @ out), HELD - edge
+    begin = hidden / slope * np.array([np.sin(slope), 1 - np.cos(slope)])
+    at = np.arange(APART, away[-1] - APART / 2, APART)
+    along, fallen = (np.interp(at, away, flat @ axis) + by for axis, by in zip((out, down), begin, strict=True))
+    place = np.stack([edge - at, 0 * at, 0 * at], 1)
+    rested = np.stack([HELD - along, -fallen, 0 * at], 1)
     visible = np.zeros((len(at), FRAMES), bool)
     visible[:, [0, *range(FRAMES - SEEN, FRAMES)]] = True
     points = np.where(np.arange(FRAMES)[:, None] == 0, place[:, None], rested[:, None])
@@ -63,7 +71,7 @@ def hanging(depth: np.ndarray, tets: Path) -> Recording:
         name="beam",
         fps=FPS,
         mesh=mesh,
-        boxes=np.array([[[BAR / 2, *low[1:]], high]]),
+        boxes=np.array([[[HELD, *low[1:]], high]]),
         points=np.where(visible[..., None], points, np.nan).astype(np.float32),
         visible=visible,
         sigma=np.full(len(at), SIGMA),
@@ -89,8 +97,11 @@ def outline(depth: np.ndarray) -> np.ndarray:
     return binary_fill_holes(parts == 1 + int(sizes.argmax()))
 
 
-def midline(mask: np.ndarray) -> np.ndarray:
-    """Middle of the bar from the clamp to the free head [px], (N, 2): each step goes where the outline is narrowest."""
+def midline(mask: np.ndarray) -> tuple[np.ndarray, float]:
+    """Middle of the bar from the clamp to the free head [px], (N, 2), and its width [px].
+
+    Each step goes where the outline is narrowest.
+    """
     point, heading = START.copy(), np.pi - BEGIN
     path, widths = [], []
     while True:
@@ -106,7 +117,8 @@ def midline(mask: np.ndarray) -> np.ndarray:
     first = np.array(path[0])
     slope = (np.array(path[3]) - first) / np.linalg.norm(np.array(path[3]) - first)
     steps = (first[0] - WINDOW[1, 0] + 2) / slope[0]
-    return _smooth(np.array([first - slope * s for s in np.arange(steps, 0, -STRIDE)] + path))
+    whole = _smooth(np.array([first - slope * s for s in np.arange(steps, 0, -STRIDE)] + path))
+    return whole, float(np.median(widths))
 
 
 def _across(mask: np.ndarray, point: np.ndarray, heading: float) -> tuple[float, float] | None:
@@ -130,10 +142,6 @@ def _smooth(path: np.ndarray, degree: int = 5) -> np.ndarray:
     """A polynomial in the arc length; what a bar's bending cannot do is the outline's noise."""
     s = np.linspace(-1, 1, len(path))
     return np.stack([np.polynomial.Chebyshev.fit(s, column, degree)(s) for column in path.T], 1)
-
-
-def _length(path: np.ndarray) -> float:
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
 def surface(path: Path) -> Mesh:
