@@ -20,7 +20,9 @@ from surgisim.physics.place import Place
 from surgisim.recordings.mesh import Mesh
 from surgisim.recordings.recording import Recording
 
-SIZE, FPS, FRAMES, FIT = np.array([0.036, 0.030, 0.012]), 10.0, 32, 24
+SIZE, FPS, FRAMES, FIT = np.array([0.036, 0.030, 0.012]), 20.0, 32, 24
+SLOWLY = 10.0
+"""Frames a second at which weak effects show: at FPS half as many steps are run, and inertia hides them."""
 GRID = 0.23
 TRUE = np.array([np.log(2.5e3), 0.44, np.log(4e-3)])
 NOISE = dict(

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planted import TRUE, case_of, recording
+from planted import SLOWLY, TRUE, case_of, recording
 
 from surgisim.diagnosis import calibration, judgement
 from surgisim.diagnosis.evidence import Finding
@@ -21,7 +21,7 @@ def case():
         "fibre": {"k1": 4e3, "k2": 0.5, "yaw": 0.0, "pitch": np.pi / 2},
     }
     # Weight alone moves the whole picture as a camera does, and nothing drifts here.
-    return case_of(recording(values=planted)).drifting(np.full(3, 1e-4))
+    return case_of(recording(values=planted, fps=SLOWLY)).drifting(np.full(3, 1e-4))
 
 
 def found(case, h: Hypothesis, amplitude: np.ndarray) -> Refit:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import GRID, case_of, memo_of, plain, recording
+from planted import GRID, SLOWLY, case_of, memo_of, plain, recording
 
 from surgisim.artifacts.character import Truly
 from surgisim.config.diagnosis import Diagnosing
@@ -126,7 +126,7 @@ def test_a_character_is_right_where_all_that_is_asked_is():
 
 @pytest.fixture(scope="module")
 def swollen():
-    case = case_of(recording(**PLANTED), free=0, replay=GRID)
+    case = case_of(recording(**PLANTED, fps=SLOWLY), free=0, replay=GRID)
     return case, modelled(case, quiet)
 
 
@@ -162,7 +162,7 @@ def test_no_verdict_depends_on_a_law_without_a_name_and_physics_has_it_where_it_
         judging, "judged", lambda case, laws, tried, over=None, w=False: judged(case, laws, tried, worse)
     )
     monkeypatch.setattr(judgement, "borne_out", lambda *_: 0.6)
-    made = recording(**PLANTED)
+    made = recording(**PLANTED, fps=SLOWLY)
     settings = Diagnosing(grid=GRID, replay=GRID, nulls=8, experiment=False, free=0, second=False)
     (with_it, physics, _), (without, bare, _) = (
         diagnose(made, settings.model_copy(update={"residual": on}), quiet, memo_of(made)) for on in (True, False)

@@ -8,6 +8,8 @@ from surgisim.artifacts.frames import Frames
 from surgisim.artifacts.masks import Masks
 from surgisim.artifacts.scene import Scene
 from surgisim.artifacts.tracks import Tracks
+from surgisim.estimation import fit
+from surgisim.estimation.doubts import none
 from surgisim.mpm.setup import prepare
 
 FPS, T = 25.0, 24
@@ -18,6 +20,13 @@ QUICK = {"field_iterations": 0, "image_weight": 0.0, "iterations": 5}
 
 def silent(*_):
     pass
+
+
+def alone(monkeypatch) -> None:
+    """A fit without what else there might be, a finer grid and what is left open: half of its time."""
+    monkeypatch.setattr(fit, "_weighed", lambda trial, solution, *_: (trial, solution, {}, []))
+    monkeypatch.setattr(fit, "finely", lambda trial, solution, *_: (trial, solution))
+    monkeypatch.setattr(fit, "doubts", lambda trial, x, spreads, beside, tracks, camera: none(tracks))
 
 
 def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, deep=0.015, seed=0, places=None, spacing=0.003):

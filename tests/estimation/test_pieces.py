@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from slab import pulled, slab
-from slab_clip import CAMERA, FPS, QUICK, TRUE, T, clip, silent
+from slab_clip import CAMERA, FPS, QUICK, TRUE, T, alone, clip, silent
 
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
@@ -111,7 +111,8 @@ def swinging():
 
 
 @pytest.mark.slow(110)
-def test_a_strip_is_told_from_the_block_it_lies_on(swinging):
+def test_a_strip_is_told_from_the_block_it_lies_on(swinging, monkeypatch):
+    alone(monkeypatch)
     found = estimate(*swinging, Estimation(**QUICK | {"iterations": 1}), silent)
     costs = {h["as"]: h["cost"] for h in found.fit.history if h["round"] == "hold" and "grip" not in h}
     without = next(h["without"] for h in found.fit.history if h["round"] == "hold")

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from slab import pulled
-from slab_clip import CAMERA, QUICK, TRUE, T, clip, silent
+from slab_clip import CAMERA, QUICK, TRUE, T, alone, clip, silent
 
 from surgisim.config.estimation import Estimation
 from surgisim.estimation.carrying import TOWARD, TOWARD_READ, carrying
@@ -43,7 +43,8 @@ def test_planted_parameters_are_found_from_a_pull_and_its_release():
 
 
 @pytest.mark.slow
-def test_a_pull_without_a_release_cannot_tell_the_modulus():
+def test_a_pull_without_a_release_cannot_tell_the_modulus(monkeypatch):
+    alone(monkeypatch)
     slow = pulled(frames=T, hold=T)
     _, _, fit, *_ = estimate(*clip(motion=slow, noise=1e-4), Estimation(**QUICK), silent)
     release = fit.identifiability["corotated.E"]["phases"]["release"]
@@ -91,7 +92,9 @@ def test_frames_held_out_are_never_looked_at():
 
 
 @pytest.mark.slow
-def test_a_stiff_half_is_found_by_the_refinement():
+def test_a_stiff_half_is_found_by_the_refinement(monkeypatch):
+    alone(monkeypatch)
+
     def stiff(rest):
         return np.where(rest[:, 0] > 0, 2.0, 0.7)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from slab import pulled
-from slab_clip import CAMERA, QUICK, TRUE, T, clip, silent
+from slab_clip import CAMERA, QUICK, TRUE, T, alone, clip, silent
 
 from surgisim.artifacts.tracks import Tracks
 from surgisim.config.estimation import Estimation
@@ -86,14 +86,16 @@ def fitted(moved: np.ndarray | None, settings: Estimation):
 
 
 @pytest.mark.slow(40)
-def test_a_still_surrounding_is_left_alone(quick):
+def test_a_still_surrounding_is_left_alone(quick, monkeypatch):
+    alone(monkeypatch)
     found = fitted(None, quick)
     assert found.fit.held_out["support"]["patches"] == 0
     assert not len(found.motion.rim)
 
 
 @pytest.mark.slow(70)
-def test_a_surrounding_that_goes_away_carries_the_edge(quick):
+def test_a_surrounding_that_goes_away_carries_the_edge(quick, monkeypatch):
+    alone(monkeypatch)
     found = fitted(np.linspace(0, 1, T)[:, None] * AWAY, quick)
     patches = found.fit.held_out["support"]["patches"]
     assert patches > PATCHES // 2

@@ -179,15 +179,15 @@ def test_a_run_is_invented_sealed_diagnosed_opened_and_scored(tmp_path):
     assert not (out / "0" / "main" / "score.json").exists()
 
 
-@pytest.mark.slow(400)
-def test_two_real_cases_go_from_their_seal_to_a_score(tmp_path):
+@pytest.mark.slow(200)
+def test_a_real_case_goes_from_its_seal_to_a_score(tmp_path):
     for name in ("surgisim", "stages", "workflow", "config", "envs"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     tree = Tree(tmp_path, tmp_path / "out")
-    few = {"points": 80, "spacing": 0.004, "spacing_coarse": 0.005, "only": ["stiff_inclusion", "gravity"]}
-    # Side by side, a processor each: two threads for one diagnosis gain less. One law, on one grid, will do.
+    few = {"points": 80, "spacing": 0.004, "spacing_coarse": 0.005, "only": ["stiff_inclusion"]}
+    # One law, on one grid, will do.
     tree.choices = {
-        "cases": 2,
+        "cases": 1,
         "seed": 4,
         "invent": few | {"snr_low": 3.0, "snr_high": 5.0},
         "diagnosis": {
@@ -204,10 +204,9 @@ def test_two_real_cases_go_from_their_seal_to_a_score(tmp_path):
     assert tree.run("--set-threads", "diagnosis=1", "--keep-going", "blind") == 0
     out = tmp_path / "out" / "blind" / "4"
     board = json.loads((out / "main" / "scoreboard.json").read_text())
-    assert (board["count"], board["seals"]) == (2, 2)
-    local, everywhere = board["cases"]
-    assert [c["concealed"][0]["term"] for c in (local, everywhere)] == ["stiff_inclusion", "gravity"]
-    assert everywhere["top1"]
-    assert everywhere["held_out"]["after"] < everywhere["held_out"]["before"]
+    assert (board["count"], board["seals"]) == (1, 1)
+    (local,) = board["cases"]
+    assert [one["term"] for one in local["concealed"]] == ["stiff_inclusion"]
+    assert local["held_out"]["after"] < local["held_out"]["before"]
     assert local["top1"]
     assert local["places"][0]["right"]

@@ -152,7 +152,7 @@ def turned(clip: Clip) -> int | None:
 
 
 def seen_period(clip: Clip) -> float:
-    """Of a swing as the recording shows it [s]: twice the time of the first turn; the whole clip where nothing turns."""
+    """Of a swing as it is seen [s]: twice the time of the first turn; the whole clip where nothing turns round."""
     return 2 * (turned(clip) or clip.until / 2) / clip.fps
 
 

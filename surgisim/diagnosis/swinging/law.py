@@ -9,9 +9,9 @@ from surgisim.diagnosis.clip import Clip
 from surgisim.mpm.setup import Values
 from surgisim.physics.place import Place
 
-EXTENT, HUNG, SEAM = 0.05, 0.02, 0.02
-"""Over the body's length: extent of tissue that differs in one place, and of what is hung or pushes there, which at an
-end would otherwise act further in; how gradually one part passes into the other."""
+EXTENT, SEAM = 0.05, 0.02
+"""Over the body's length: extent of tissue that differs in one place, and how gradually one part passes into the
+other."""
 ALWAYS = {"onset": 0.0, "end": 60.0}
 ALONG = (0.0, 0.5)
 """Places of what acts in one place, from the free end (0) to what is held (1), that are tried before a fit."""
@@ -51,6 +51,8 @@ class Frame:
     """[s]"""
     E: float
     """Of the base [Pa]."""
+    finest: float
+    """Half as wide as a particle [m]."""
 
     @property
     def length(self) -> float:
@@ -66,8 +68,12 @@ class Frame:
         x, y, z = self.free + float(share) * (self.held - self.free)
         return float(x), float(y), float(z)
 
-    def somewhere(self, share: float, extent: float = EXTENT) -> Place:
-        return Place(self.along(share), extent * self.length)
+    def somewhere(self, share: float) -> Place:
+        return Place(self.along(share), EXTENT * self.length)
+
+    def point(self, share: float) -> Place:
+        """As small as the body resolves: what hangs on an end would otherwise act further in."""
+        return Place(self.along(share), self.finest)
 
 
 def frame_of(clip: Clip, x: np.ndarray, period: float) -> Frame:
@@ -88,4 +94,4 @@ def frame_of(clip: Clip, x: np.ndarray, period: float) -> Frame:
     size = float(np.linalg.norm(gravity))
     mass = float(clip.density * body.volume.sum())
     down = gravity / size if size else gravity
-    return Frame(free, held, down, mass, mass * (size or 9.81), period, float(np.exp(x[0])))
+    return Frame(free, held, down, mass, mass * (size or 9.81), period, float(np.exp(x[0])), half)
