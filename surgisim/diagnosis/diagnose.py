@@ -16,7 +16,7 @@ from surgisim.diagnosis.candidates import Parts, costly
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.context import Case, nulls, workers
 from surgisim.diagnosis.evidence import Finding, Scores, by_law
-from surgisim.diagnosis.foretold import foretold, of_base
+from surgisim.diagnosis.foretold import of_base, of_laws
 from surgisim.diagnosis.joint import Joint, fit_jointly, needed
 from surgisim.diagnosis.laws import IMPOSSIBLE, law_of, respond
 from surgisim.diagnosis.memo import Memo
@@ -135,7 +135,7 @@ def unheard(case: Case, laws: Scores, ranked: list[str], refits: list[Refit], pr
     if case.prospect is None or judgement.guessed(case):
         return []
     first = refits[0]
-    ahead = case.prospect.gain(of_base(case), foretold(case, [first], case.base.simulated + first.response))
+    ahead = case.prospect.gain(of_base(case), of_laws(case, [first], case.base.simulated + first.response))
     if first.log_evidence >= calibration.CLEAR and not ahead.refuted:
         return []
     known = {r.term for r in refits}

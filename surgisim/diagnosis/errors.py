@@ -41,11 +41,7 @@ def as_filmed(case, simulated: np.ndarray) -> np.ndarray:
     groups = [g for g in case.groups if g.name in ("drift", *BY_VIDEO)]
     if not groups:
         return simulated
-    left, ahead = case.clip.moved - simulated, case.prospect
-    if ahead is None:
-        likely = case.space.likely(case.whiten(left[:, : case.clip.until]))
-    else:
-        likely = ahead.space_all.likely(ahead.whiten_all(left))
+    likely, _ = _likely(case, simulated, whole=True)
     for group in groups:
         simulated = simulated + np.tensordot(likely[nuisance.span(case.groups, group.name)], group.columns, 1)
     return simulated
@@ -54,11 +50,7 @@ def as_filmed(case, simulated: np.ndarray) -> np.ndarray:
 def beside_nuisances(case, simulated: np.ndarray, whole: bool = False) -> np.ndarray:
     """A prediction with everything that may be beside it, at its likeliest, in the fitted frames, and as it was in
     those held out; in all frames, where `whole` and any are held out [m], (K, T, 3)."""
-    left, ahead = case.clip.moved - simulated, case.prospect if whole else None
-    if ahead is None:
-        likely, span = case.space.likely(case.whiten(left[:, : case.clip.until])), slice(0, case.clip.until)
-    else:
-        likely, span = ahead.space_all.likely(ahead.whiten_all(left)), slice(0, case.clip.frames)
+    likely, span = _likely(case, simulated, whole)
     result, at = simulated.copy(), 0
     for group in case.groups:
         result[:, span] += np.tensordot(likely[at : at + len(group.columns)], group.columns[:, :, span], 1)
@@ -66,6 +58,15 @@ def beside_nuisances(case, simulated: np.ndarray, whole: bool = False) -> np.nda
     slopes = case.base.slopes
     result[:, : case.clip.until] += np.tensordot(likely[at : at + len(slopes)], slopes, 1)
     return result
+
+
+def _likely(case, simulated: np.ndarray, whole: bool) -> tuple[np.ndarray, slice]:
+    """How much of each nuisance is likeliest beside a prediction, (C,), and by which frames: the fitted ones, or all,
+    where `whole` and any are held out."""
+    left, ahead = case.clip.moved - simulated, case.prospect if whole else None
+    if ahead is None:
+        return case.space.likely(case.whiten(left[:, : case.clip.until])), slice(0, case.clip.until)
+    return ahead.space_all.likely(ahead.whiten_all(left)), slice(0, case.clip.frames)
 
 
 def rms(case, simulated) -> tuple[float, float | None]:

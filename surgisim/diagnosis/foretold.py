@@ -24,7 +24,7 @@ def of_base(case) -> Foretold:
     return Foretold(case.base.simulated, case.by_base.ways(case.base.known))
 
 
-def foretold(case, refits: list, moved: np.ndarray, known: Known | None = None) -> Foretold:
+def of_laws(case, refits: list, moved: np.ndarray, known: Known | None = None) -> Foretold:
     """Laws of a `Joint`; moved: displacement with all of them [m], (K, T, 3); known: how surely the numbers of the base
     beside them, as its fit with the first of them has it if None."""
     known, until = known or refits[0].known or case.base.known, case.clip.until

@@ -16,7 +16,7 @@ from surgisim.diagnosis.contact import outward
 from surgisim.diagnosis.context import Case
 from surgisim.diagnosis.errors import as_filmed, beside_nuisances, bootstrap, noise_floor, residual, rms, taken_off
 from surgisim.diagnosis.evidence import Scores, best
-from surgisim.diagnosis.foretold import foretold, of_base
+from surgisim.diagnosis.foretold import of_base, of_laws
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint, least, prediction
 from surgisim.diagnosis.noise import Noise
@@ -168,7 +168,7 @@ def _explanation(case: Case, fitted: Joint) -> Explanation:
 def _judged_ahead(case: Case, fitted: Joint) -> Explanation:
     ahead = None
     if case.prospect is not None:
-        ahead = case.prospect.gain(of_base(case), foretold(case, fitted.refits, fitted.moved))
+        ahead = case.prospect.gain(of_base(case), of_laws(case, fitted.refits, fitted.moved))
     out = max((out for out, _ in pushes(case.clip.recording, fitted.refits)), default=None)
     both = (beside_nuisances(case, s, whole=True) for s in (case.base.simulated, fitted.moved))
     low, high = bootstrap(case, *both)

@@ -14,7 +14,7 @@ from surgisim.diagnosis.context import Case
 from surgisim.diagnosis.errors import as_filmed, errors, residual, rms
 from surgisim.diagnosis.evidence import highest
 from surgisim.diagnosis.experiment import separating
-from surgisim.diagnosis.foretold import foretold
+from surgisim.diagnosis.foretold import of_laws
 from surgisim.diagnosis.hypothesis import Hypothesis
 from surgisim.diagnosis.joint import Joint
 from surgisim.diagnosis.judgement import (
@@ -61,7 +61,7 @@ def write(
         over = None
         if wrong is not None and case.prospect is not None:
             known = fitted.refits[0].known
-            over = case.prospect.gain(*(foretold(case, t.refits, t.moved, known) for t in (wrong, fitted)))
+            over = case.prospect.gain(*(of_laws(case, t.refits, t.moved, known) for t in (wrong, fitted)))
         shown = beside_placebo(case, fitted, wrong)
         said_of = judged(case, laws, tried, over, worse(case, shown))
         if not said_of.named:

@@ -114,7 +114,7 @@ def test_a_law_s_strength_is_open_by_what_its_chi_square_tells_after_it_is_divid
     one.by_base = ByBase(one)
     response = 1e-3 * RNG.standard_normal((POINTS, FRAMES, 3))
     law = SimpleNamespace(response=response, gain=50.0, known=None)
-    told = made.foretold(one, [law], one.base.simulated)
+    told = made.of_laws(one, [law], one.base.simulated)
     chi = float(((1e4 * response[:, :UNTIL]) ** 2).sum())
     own = told.ways[3]
     assert own[:, UNTIL:] == pytest.approx(

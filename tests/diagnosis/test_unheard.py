@@ -15,7 +15,7 @@ GAINS = {"fibre": 30.0, "damage": 8.0, "tether": 0.5 * SOME}
 def heard(monkeypatch):
     """Which laws are run of those that are there beside a first one, `fibre`."""
     monkeypatch.setattr(diagnose, "sharpened", lambda case, law, z: (law.best, 0.0))
-    monkeypatch.setattr(diagnose, "foretold", lambda case, refits, moved: moved)
+    monkeypatch.setattr(diagnose, "of_laws", lambda case, refits, moved: moved)
     monkeypatch.setattr(diagnose, "of_base", lambda case: case.base.simulated)
     monkeypatch.setattr(diagnose, "refit", lambda case, finding, evidence, z, rounds: (finding.gain, rounds))
     laws = {term: SimpleNamespace(best=SimpleNamespace(gain=gain)) for term, gain in GAINS.items()}

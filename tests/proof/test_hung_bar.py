@@ -8,8 +8,8 @@ from proof import made_up
 
 from surgisim.mpm.simulator import Breakdown
 from surgisim.proof.known.silicone_halves import ask
+from surgisim.proof.recorded.hanging_beam import BAR
 from surgisim.proof.rigs import hung_bar, let_go
-from surgisim.proof.rigs.hanging_beam import BAR
 from surgisim.recordings.recording import no_grips
 
 T = 6

@@ -13,19 +13,19 @@ DAMPS = ("newtonian", "relaxation", "relaxation_slow", "drag", "paper_viscous")
 
 
 def convert(folder: Path):
-    from surgisim.proof.rigs.clamped_beam import carried
+    from surgisim.proof.recorded.clamped_beam import carried
 
     return carried(folder / "beam_gravity_V2_a.c3d")
 
 
 def hold_out(folder: Path):
-    from surgisim.proof.rigs.clamped_beam import carried
+    from surgisim.proof.recorded.clamped_beam import carried
 
     return carried(folder / "beam_gravity_V2_b.c3d", "take-b")
 
 
 def ask(folder: Path, found: Found) -> list[Answer]:
-    from surgisim.proof.rigs.clamped_beam import simulated, swings
+    from surgisim.proof.recorded.clamped_beam import simulated, swings
 
     answers = [named(found.verdict, DAMPS, "damping, by any law that loses energy")]
     if not set(found.verdict.names) & set(DAMPS):

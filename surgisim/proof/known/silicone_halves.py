@@ -10,7 +10,7 @@ LUMPS = ("stiff_inclusion", "base_layer")
 
 
 def convert(folder: Path):
-    from surgisim.proof.rigs.hanging_beam import hanging
+    from surgisim.proof.recorded.hanging_beam import hanging
 
     with np.load(folder / "lidar_depth_targets_m_768x1024.npz") as pictures:
         depth = pictures["h_em_c"].astype(float)

@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from surgisim.mpm.setup import Values
 from surgisim.physics.place import Place
 from surgisim.proof.known.catalogue import Found, Panel, curve
-from surgisim.proof.rigs.hanging_beam import BAR, SEEN
+from surgisim.proof.recorded.hanging_beam import BAR, SEEN
 from surgisim.proof.rigs.let_go import Law, misfit, name, rms, simulate
 from surgisim.recordings.recording import Recording
 

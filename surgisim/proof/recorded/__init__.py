@@ -1,0 +1,1 @@
+"""What others measured, made into recordings that the tool reads."""
