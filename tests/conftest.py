@@ -1,6 +1,7 @@
 """What tests of several rooms use."""
 
 import os
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -24,6 +25,18 @@ def shared() -> Path:
 
 SLOW = 15
 """What a slow test takes that does not say how long it does [s]: `@pytest.mark.slow(seconds)`."""
+
+
+UNTIL = float(os.environ.get("SLOW_TESTS_UNTIL", "inf"))
+"""When no slow test is begun any more [s since 1970]: what has a limit sets it, so that a machine that is far slower
+than others leaves the rest of them out, and says so, instead of being cut off in the middle."""
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if time.time() > UNTIL and item.get_closest_marker("slow"):
+        pytest.skip(
+            "NOT BEGUN: too slow a machine for all slow tests within its limit. `make test-slow` runs them."
+        )
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import GRID, TILT, memo_of, plain, recording, tilted
+from planted import GRID, SLOWLY, TILT, memo_of, plain, recording, tilted
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, judgement
@@ -23,7 +23,7 @@ WORSE = Gain(-50.0, -80.0, -20.0, 60.0)
 
 
 def verdict(settings=SETTINGS, **planted):
-    made = recording(**planted)
+    made = recording(**planted, fps=SLOWLY)
     return diagnose(made, settings, lambda *_: None, memo_of(made))
 
 

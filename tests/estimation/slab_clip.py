@@ -29,24 +29,21 @@ def alone(monkeypatch) -> None:
     monkeypatch.setattr(fit, "doubts", lambda trial, x, spreads, beside, tracks, camera: none(tracks))
 
 
+RUNS: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+"""Of planted slabs, by what was planted: the surface's points and where they go, (K, T, 3) [m]."""
+
+
 def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, deep=0.015, seed=0, places=None, spacing=0.003):
     """What the stages before would hand over, made with `values` on a grid of `spacing` [m] and then forgotten.
 
     deep: from where on the tissue is held [m].
     """
-    body, fine, motion = slab(), slab(spacing=spacing), motion or pulled(frames=T, hold=9)
-    made = prepare(fine, tuple(values), density=1050.0, places=places, grips=motion)
-    theta, held = made.theta(values), fine.rest[:, 2] > 0.06 + deep
-    if stiff is not None:
-        theta[:, 0] *= stiff(fine.rest)
-    per_frame = 2 * made.per_frame(
-        {**values, "corotated": {"E": theta[:, 0].max(), "nu": values["corotated"]["nu"]}}, FPS
-    )
-    run = made.simulator.run(theta, made.drive(motion, values, fps=FPS, per_frame=per_frame, held=held, firm=False))
-    points = body.rest[body.surface].astype(float)
+    body, motion = slab(), motion or pulled(frames=T, hold=9)
+    key = repr((values, motion.position.tobytes(), motion.active.tobytes(), stiff, deep, places, spacing))
+    if key not in RUNS:
+        RUNS[key] = _moved(body, motion, values, stiff, deep, places, spacing)
+    points, xyz = (part.copy() for part in RUNS[key])
     rng = np.random.default_rng(seed)
-    carry = made.simulator.carry(points)
-    xyz = np.stack([points + carry @ u.astype(float) for u in run.u], 1)
     xyz = xyz + np.where(np.arange(T)[:, None] > 0, rng.normal(0, noise, xyz.shape), 0.0)
     k = xyz.shape[:2]
     tracks = Tracks(
@@ -60,3 +57,18 @@ def clip(values=TRUE, motion=None, noise=3e-5, stiff=None, deep=0.015, seed=0, p
     g = len(points)
     scene = Scene(points, np.zeros(g), np.full((g, 3), -6.5), np.tile([1.0, 0, 0, 0], (g, 1)), np.full((g, 3), 0.5))
     return body, scene, tracks, motion, Frames(rgb, split), Masks(some, ~some, some, np.ones(T, np.float32)), CAMERA
+
+
+def _moved(body, motion, values, stiff, deep, places, spacing) -> tuple[np.ndarray, np.ndarray]:
+    fine = slab(spacing=spacing)
+    made = prepare(fine, tuple(values), density=1050.0, places=places, grips=motion)
+    theta, held = made.theta(values), fine.rest[:, 2] > 0.06 + deep
+    if stiff is not None:
+        theta[:, 0] *= stiff(fine.rest)
+    per_frame = 2 * made.per_frame(
+        {**values, "corotated": {"E": theta[:, 0].max(), "nu": values["corotated"]["nu"]}}, FPS
+    )
+    run = made.simulator.run(theta, made.drive(motion, values, fps=FPS, per_frame=per_frame, held=held, firm=False))
+    points = body.rest[body.surface].astype(float)
+    carry = made.simulator.carry(points)
+    return points, np.stack([points + carry @ u.astype(float) for u in run.u], 1)

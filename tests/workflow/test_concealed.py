@@ -179,7 +179,7 @@ def test_a_run_is_invented_sealed_diagnosed_opened_and_scored(tmp_path):
     assert not (out / "0" / "main" / "score.json").exists()
 
 
-@pytest.mark.slow(200)
+@pytest.mark.slow(450)
 def test_a_real_case_goes_from_its_seal_to_a_score(tmp_path):
     for name in ("surgisim", "stages", "workflow", "config", "envs"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
