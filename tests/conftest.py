@@ -34,9 +34,7 @@ than others leaves the rest of them out, and says so, instead of being cut off i
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
     if time.time() > UNTIL and item.get_closest_marker("slow"):
-        pytest.skip(
-            "NOT BEGUN: too slow a machine for all slow tests within its limit. `make test-slow` runs them."
-        )
+        pytest.skip("NOT BEGUN: too slow a machine for all slow tests within its limit. `make test-slow` runs them.")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import GRID, SLOWLY, TILT, memo_of, plain, recording, tilted
+from planted import GRID, SLOWLY, TILT, case_of, memo_of, recording, tilted
 
 from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis import calibration, judgement
@@ -81,7 +81,7 @@ def test_a_law_with_which_the_frames_held_out_are_farther_off_is_not_named(monke
 def test_nuisances_larger_than_they_ever_are_are_something_hidden(bare, monkeypatch):
     found, *_ = bare
     assert found.global_test["nuisance_ratio"] < 1.0
-    case = plain()
+    case = case_of(recording(fps=SLOWLY))
     assert case.nuisance_ratio == pytest.approx(found.global_test["nuisance_ratio"], rel=1e-3)
     columns = case.space.columns
     for size, strained in ((1.0, False), (3.0, True)):

@@ -1,6 +1,7 @@
 """Real recordings whose makers know the cause: how they are turned into recordings, and what is asked."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -64,7 +65,21 @@ def test_the_soft_half_may_be_said_either_way(tmp_path):
     ask = chosen("silicone_halves").ask
     for factor, x, right in ((0.5, 0.03, True), (2.0, -0.03, True), (2.0, 0.03, False), (0.5, -0.03, False)):
         lump = Effect("stiff_inclusion", 0.9, center=(x, 0.0, 0.0), parameters={"s": {"value": factor, "unit": "1"}})
-        assert ask(tmp_path, found(lump))[-1].met is right
+        half, size = ask(tmp_path, found(lump))[1:]
+        assert (half.met, size.met) == (right, True)
+
+
+def test_a_soft_part_is_asked_where_it_begins_and_how_soft_it_is(tmp_path):
+    ask = chosen("silicone_halves").ask
+
+    def answers(x: float, factor: float) -> list[bool]:
+        part = Effect("stiff_inclusion", 0.9, center=(x, 0.0, 0.0), parameters={"s": {"value": factor, "unit": "1"}})
+        told = found(part)
+        beyond = {"stiff_inclusion": {"center": [x, 0.0, 0.0], "extent": 0.004, "normal": [1.0, 0.0, 0.0]}}
+        return [a.met for a in ask(tmp_path, replace(told, physics={"places": beyond}))]
+
+    assert answers(0.01, 0.4) == [True, True, True, True]
+    assert answers(0.03, 0.1) == [True, True, False, False]
 
 
 def test_a_load_is_asked_for_its_place_and_mass(tmp_path):
