@@ -15,6 +15,7 @@ from surgisim.diagnosis.swinging.diagnose import diagnose_swinging
 from surgisim.diagnosis.swinging.fit import Tried
 from surgisim.diagnosis.swinging.period import LONG, loading, responses, slowest_period
 from surgisim.mpm.simulator import Breakdown
+from surgisim.physics.place import Place
 from surgisim.problem import Problem
 from surgisim.recordings.mesh import Mesh
 from surgisim.recordings.recording import Recording, no_grips
@@ -148,10 +149,10 @@ def test_a_law_must_foretell_better_than_one_of_many_would_by_accident(engine, b
             return moved[values]
 
     base, law = (Tried(None, START, np.zeros(0), n, {}, 0.0, 0.0, np.zeros(0)) for n in ("base", "law"))
-    assert made.surely_better(Runs(), base, law, held, 9) == said
-    assert made.surely_better(Runs(), base, law, replace(held, period=np.inf), 9) == said
+    assert made.surely_better([(Runs(), base, law, held)], 9) == said
+    assert made.surely_better([(Runs(), base, law, replace(held, period=np.inf))], 9) == said
     # Of itself nobody can be better.
-    assert not made.surely_better(Runs(), base, base, held, 9)
+    assert not made.surely_better([(Runs(), base, base, held)], 9)
 
 
 def test_a_load_beside_a_base_that_another_recording_told_is_found_with_its_mass(engine):
@@ -210,3 +211,46 @@ def test_of_what_hangs_at_rest_every_second_point_is_held_out():
     assert half.seen.sum() == rest.seen.sum() == 6 * 2
     assert not (half.seen & rest.seen).any()
     assert not course.comes_to_rest(clip_of(released(top(FRAMES), 100.0), share=0.23))
+
+
+SAG, TALL = 3e-3, 0.06
+"""Of the top of an even post of modulus E, and its height [m]."""
+
+
+def sagged(values, places, height: np.ndarray) -> np.ndarray:
+    """How far places of a post go along x [m], by the shear of what lies between them and what is held."""
+    z = np.linspace(0.0025, TALL, 200)
+    stiff = np.full(len(z), values["neo_hookean_ciarlet"]["E"] / E)
+    if "stiff_inclusion" in values:
+        share = places["stiff_inclusion"].weight(np.stack([0 * z, 0 * z, z], 1))
+        stiff = stiff * (1 + (values["stiff_inclusion"]["s"] - 1) * share)
+    return SAG * np.interp(height, z, np.cumsum((TALL - z) / stiff)) / np.cumsum(TALL - z)[-1]
+
+
+def test_what_hangs_is_foretold_both_ways_and_its_soft_part_is_found(monkeypatch):
+    def simulate(clip, values, places, frames, memo=None):
+        moved = sagged(values, places, clip.rest[:, 2])[:, None, None] * np.array([1.0, 0, 0])
+        return np.repeat(moved, frames, 1) * (np.arange(frames) > 0)[None, :, None]
+
+    for room in (fit, made):
+        monkeypatch.setattr(room, "simulate", simulate)
+    monkeypatch.setattr(made, "slowest_period", lambda clip, x: SWING / FPS * np.sqrt(E / np.exp(x[0])))
+    place = np.stack([np.zeros(14), np.zeros(14), np.linspace(0.006, 0.058, 14)], 1)
+    true = Place((0.0, 0.0, 0.03), 0.001, (0.0, 0.0, -1.0))
+    gone = sagged(
+        {"neo_hookean_ciarlet": {"E": E}, "stiff_inclusion": {"s": 0.4}}, {"stiff_inclusion": true}, place[:, 2]
+    )
+    points = np.full((14, FRAMES, 3), np.nan)
+    points[:, 0], points[:, FIT - 1] = place, place + gone[:, None] * np.array([1.0, 0, 0])
+    points[:, FIT - 1] += 5e-5 * np.random.default_rng(5).standard_normal((14, 3))
+    post = Mesh(block().vertices * [0.25, 0.25, 5.0], block().faces)
+    hung = replace(released(points, FPS, post), place=place, split={"fit": (0, FIT), "held_out": (FIT, FIT)})
+    ways = []
+    swapped = made._swapped
+    monkeypatch.setattr(made, "_swapped", lambda *told: ways.append(told) or swapped(*told))
+    verdict, physics, _ = found([hung])
+    assert len(ways) == 1
+    assert verdict.effects[0]["term"] == "stiff_inclusion"
+    assert "points between those that were fitted" in verdict.words
+    assert physics.terms["stiff_inclusion"]["s"]["value"] == pytest.approx(0.4, rel=0.2)
+    assert physics.places["stiff_inclusion"]["center"][2] == pytest.approx(0.03, abs=0.004)

@@ -22,12 +22,12 @@ from surgisim.config.diagnosis import Diagnosing
 from surgisim.diagnosis.base import SAFETY, TERMS
 from surgisim.diagnosis.clip import Clip, clip_of
 from surgisim.diagnosis.memo import NOTHING_KEPT, Memo
-from surgisim.diagnosis.prior import prior_of
+from surgisim.diagnosis.prior import Prior, prior_of
 from surgisim.diagnosis.swinging import course as courses
 from surgisim.diagnosis.swinging.candidates import laws
 from surgisim.diagnosis.swinging.course import Course, simulate
-from surgisim.diagnosis.swinging.fit import Body, Tried, fit_base, try_base, try_law, units
-from surgisim.diagnosis.swinging.law import frame_of
+from surgisim.diagnosis.swinging.fit import Body, Numbers, Tried, fit_base, try_base, try_law, units
+from surgisim.diagnosis.swinging.law import Frame, Law, frame_of
 from surgisim.diagnosis.swinging.period import Responses, responses, slowest_period
 from surgisim.estimation.identify import NINETY
 from surgisim.physics.catalogue import choose
@@ -87,8 +87,13 @@ def diagnose_swinging(
         progress(0.15 + 0.8 * n / len(every), 1, f"trying {law.term.replace('_', ' ')} ({n + 1} of {len(every)})")
         found = try_law(law, body, start, given, held.course, frame)
         tried += [] if found is None else [found]
+    tried, also = best_of_each(tried), []
+    if settles and held_out is None and tried:
+        # Few points are held out: those that were fitted are foretold by the others, too.
+        progress(0.95, 1, f"{tried[0].law.term.replace('_', ' ')} the other way round")
+        also = [_swapped(body, held.course, tried[0].law, numbers, given, frame)]
     progress(0.97, 1, "verdict")
-    return written(body, replace(base, spread=numbers.spread), tried, held, told)
+    return written(body, replace(base, spread=numbers.spread), tried, held, told, also)
 
 
 def same_body(first: Clip, others: Sequence[Clip]) -> None:
@@ -122,13 +127,23 @@ def _held_out(body: Body, recording: Recording | None, settings: Diagnosing) -> 
     return replace(body, courses=(half, *body.courses[1:])), HeldOut(rest, "points between those that were fitted")
 
 
+def _swapped(
+    body: Body, held: Course, law: Law, numbers: Numbers, given: Prior | None, frame: Frame
+) -> tuple[Body, Tried, Tried | None, Course]:
+    """Base and law fitted to what was held out, and what they then foretell."""
+    other, (own, *_) = replace(body, courses=(held, *body.courses[1:])), body.courses
+    x = fit_base(other, lambda x: slowest_period(body.clip, x), given, lambda text: None).x
+    found = try_law(law, other, numbers.x if given is None else given.middle, given, own, frame)
+    return other, try_base(other, x, own, frame.period), found, own
+
+
 def written(
-    body: Body, base: Tried, tried: list[Tried], held: HeldOut, told: Responses
+    body: Body, base: Tried, tried: list[Tried], held: HeldOut, told: Responses, also: Sequence[tuple] = ()
 ) -> tuple[Diagnosis, Physics, Mismatch]:
-    """Verdict, laws, and where it was off."""
-    tried = best_of_each(tried)
+    """Verdict, laws, and where it was off. tried: each law once, the best first; also: as `_swapped` gives it."""
     best = tried[0] if tried else None
-    pays = best is not None and best.fitted < base.fitted and surely_better(body, base, best, held.course, len(tried))
+    pays = best is not None and best.fitted < base.fitted
+    pays = pays and surely_better([(body, base, best, held.course), *also], len(tried))
     like = [t for t in tried[1:] if pays and t.other < CLOSE * best.other and t.fitted < base.fitted]
     verdict = "nothing detectable" if not pays else "equivalence class" if like else "named"
     share = shares(tried, body, told)
@@ -165,20 +180,26 @@ def written(
     return diagnosis, physics(body, base, best if pays else base), mismatch
 
 
-def surely_better(body: Body, base: Tried, law: Tried, held: Course, tried: int) -> bool:
+def surely_better(foretold: Sequence[tuple[Body, Tried, Tried | None, Course]], tried: int) -> bool:
     """Whether a law foretells what was held out better than the base, for certain beside `tried` laws.
 
     A one-sided t test of what the law takes off the squares in each swing, since errors last about that long; where
     fewer than LEAST_SWINGS were held out, at each point. Bonferroni's correction over all laws.
+
+    foretold: base, law and what was held out of each fit, at least one; a law that broke down there is none.
     """
-    before, after = (held.squares(body.moved(held, t.values, t.places)) for t in (base, law))
-    off = before - after
-    swing = held.period * held.clip.fps
-    swings = int(held.frames[: held.until].sum() / swing) if np.isfinite(swing) else 0
-    if swings >= LEAST_SWINGS:
-        parts = [part.sum() for part in np.array_split(off.sum(0)[held.frames[: held.until]], swings)]
-    else:
-        parts = off.sum(1)[held.seen.any(1)]
+    parts = []
+    for body, base, law, held in foretold:
+        if law is None:
+            return False
+        before, after = (held.squares(body.moved(held, t.values, t.places)) for t in (base, law))
+        off = before - after
+        swing = held.period * held.clip.fps
+        swings = int(held.frames[: held.until].sum() / swing) if np.isfinite(swing) else 0
+        if swings >= LEAST_SWINGS:
+            parts += [part.sum() for part in np.array_split(off.sum(0)[held.frames[: held.until]], swings)]
+        else:
+            parts += list(off.sum(1)[held.seen.any(1)])
     if np.ptp(parts) == 0:
         return bool(parts[0] > 0)
     return bool(ttest_1samp(parts, 0.0, alternative="greater").pvalue < DOUBT / max(tried, 1))
