@@ -1,7 +1,10 @@
 """What CI runs exists, and those who fork run the same."""
 
+import os
 import re
+import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -51,3 +54,19 @@ def test_both_run_every_test_and_the_style():
 def test_forks_take_the_torch_that_is_locked():
     locked = re.search(r"^TORCH=\$\{TORCH:-(\S+)\}", (ROOT / "envs" / "setup.sh").read_text(), re.M)[1]
     assert WORKFLOW["env"]["TORCH"].split()[0] == locked
+
+
+def test_a_machine_that_is_too_slow_leaves_slow_tests_out_and_says_so(tmp_path):
+    shutil.copy(ROOT / "tests" / "conftest.py", tmp_path)
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = slow(seconds)\n")
+    body = "import pytest\n\n@pytest.mark.slow(99)\ndef test_long(): pass\n\ndef test_short(): pass\n"
+    (tmp_path / "test_some.py").write_text(body)
+    command = [sys.executable, "-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", str(tmp_path)]
+    said = {}
+    for until in ("1", "inf"):
+        ran = subprocess.run(command, env=os.environ | {"SLOW_TESTS_UNTIL": until}, capture_output=True, text=True)
+        assert ran.returncode == 0, ran.stdout + ran.stderr
+        said[until] = ran.stdout
+    assert "1 passed, 1 skipped" in said["1"]
+    assert "NOT BEGUN" in said["1"]
+    assert "2 passed" in said["inf"]
