@@ -32,6 +32,10 @@ class Physics(JsonArtifact):
     ratios: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Of numbers that are told together better than apart, such as "eta / E": {"value", "low", "high", "unit"}."""
 
+    alone: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """The base as it was found without what is named beside it, where it differs: "E", "nu", "eta" and "eta / E", each
+    {"value", "low", "high", "unit"}. Another recording of the body begins with it."""
+
     UNITS = {"density": "kg/m^3", "gravity": "m/s^2"}
 
     def __post_init__(self) -> None:

@@ -42,7 +42,7 @@ class Elsewhere:
 
 
 def read_elsewhere(path: Path) -> Elsewhere:
-    """The base in a physics.json, with its intervals.
+    """The base in a physics.json, with its intervals; as it was without what is named beside it, where that is told.
 
     Raises Problem where the file is none, or its numbers have no intervals, are in other units, or lie beyond what is
     tried of a base.
@@ -57,9 +57,11 @@ def read_elsewhere(path: Path) -> Elsewhere:
         )
     numbers = {name: physics.terms[elastic].get(name) for name in ("E", "nu")}
     numbers["eta"] = physics.terms.get("newtonian", {}).get("eta")
+    if physics.alone:
+        numbers = {name: physics.alone.get(name) for name in numbers}
     spans = {n: _span(entry, n, path) for n, entry in numbers.items() if entry is not None}
     spans = {n: span for n, span in spans.items() if span is not None}
-    ratio = physics.ratios.get("eta / E")
+    ratio = (physics.alone or physics.ratios).get("eta / E")
     spans["eta / E"] = _ratio(spans) if ratio is None else (float(ratio["low"]), float(ratio["high"]))
     spans = {n: span for n, span in spans.items() if n != "eta" and span is not None}
     if not spans:

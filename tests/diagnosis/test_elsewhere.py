@@ -108,3 +108,12 @@ def test_a_clip_too_weak_to_tell_the_modulus_keeps_the_given_interval(tmp_path):
     assert E["low"] == pytest.approx(2e3, rel=0.12)
     assert E["high"] == pytest.approx(3e3, rel=0.12)
     assert "E" in case.base.as_given
+
+
+def test_the_base_without_what_was_named_beside_it_is_handed_on(tmp_path):
+    terms = changed("neo_hookean_ciarlet", "E", value=1.5e3, low=1e3, high=2e3)
+    terms["stiffening"] = {"k": {"value": 2e4, "unit": "Pa"}}
+    alone = {"E": TOLD["neo_hookean_ciarlet"]["E"], "nu": {"value": 0.45, "unit": "1"}, **RATIO}
+    told = read_elsewhere(file(tmp_path / "a.json", terms, alone=alone))
+    assert told.spans == {"E": (2e3, 3e3), "eta / E": (3e-3, 5e-3)}
+    assert told.passed_over == ("stiffening",)

@@ -122,6 +122,9 @@ def test_a_body_that_never_rests_is_told_what_brings_it_to_rest(engine):
     assert [e["term"] for e in verdict.effects] == ["newtonian"]
     assert physics.terms["newtonian"]["eta"]["value"] == pytest.approx(3.0, rel=0.02)
     assert physics.terms["neo_hookean_ciarlet"]["E"]["value"] == pytest.approx(E, rel=0.01)
+    # What another recording of it may begin with is the base without that.
+    assert physics.alone == verdict.base
+    assert physics.alone["E"]["low"] < E < physics.alone["E"]["high"]
     assert verdict.held_out["after"] < 0.05 * verdict.held_out["before"]
     assert "recording other, which was never fitted" in verdict.words
     assert verdict.global_test["responses"]["used"] == "engine"

@@ -281,6 +281,7 @@ def physics(body: Body, base: Tried, tried: Tried) -> Physics:
             for n, own in values.items()
         },
         ratios={"eta / E": told["eta / E"]} if alone and "eta / E" in told else {},
+        alone={} if alone else told,
         density=float(clip.density),
         gravity=[float(g) for g in clip.recording.gravity or (0.0, 0.0, 0.0)],
         grid={"spacing": float(clip.body.spacing), "step": float(step)},
