@@ -255,5 +255,6 @@ def test_what_hangs_is_foretold_both_ways_and_its_soft_part_is_found(monkeypatch
     assert len(ways) == 1
     assert verdict.effects[0]["term"] == "stiff_inclusion"
     assert "points between those that were fitted" in verdict.words
+    assert "Without a softer part" in verdict.words
     assert physics.terms["stiff_inclusion"]["s"]["value"] == pytest.approx(0.4, rel=0.2)
     assert physics.places["stiff_inclusion"]["center"][2] == pytest.approx(0.03, abs=0.004)

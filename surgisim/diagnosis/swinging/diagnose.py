@@ -232,17 +232,16 @@ def words(base: Tried, tried: list[Tried], like: list[Tried], pays: bool, held: 
             "better for certain."
         )
     best = tried[0]
-    said = best.law.term.replace("_", " ")
     text = (
-        f"Without {said} the {kind}simulation is {1e3 * base.other:.2g} mm off {held.words}, with it "
+        f"Without {best.called} the {kind}simulation is {1e3 * base.other:.2g} mm off {held.words}, with it "
         f"{1e3 * best.other:.2g} mm."
     )
     if like:
-        also = " or ".join(t.law.term.replace("_", " ") for t in like)
+        also = " or ".join(t.called for t in like)
         text += f" It may be {also} instead: this recording does not tell them apart."
     behind = [t for t in tried[1:] if t not in like]
     if behind:
-        text += f" The next law, {behind[0].law.term.replace('_', ' ')}, leaves {1e3 * behind[0].other:.2g} mm."
+        text += f" The next law, {behind[0].called}, leaves {1e3 * behind[0].other:.2g} mm."
     return text
 
 

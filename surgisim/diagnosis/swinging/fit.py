@@ -97,6 +97,11 @@ class Tried:
     spread: np.ndarray
     """Standard deviation of log E, log eta / E and the law's own numbers, each as it is searched."""
 
+    @property
+    def called(self) -> str:
+        """The law, for a reader."""
+        return self.law.called(self.numbers) if self.law.called else self.law.term.replace("_", " ")
+
 
 @dataclass(frozen=True)
 class Numbers:

@@ -29,6 +29,8 @@ class Law:
     """Values of each number that are tried before a fit."""
     low: tuple[float, ...]
     high: tuple[float, ...]
+    called: Callable[[np.ndarray], str] | None = None
+    """What a reader is told from its own numbers; its term if None."""
     divides: int | None = None
     """Which number the base's modulus is to be divided by, so that tissue near what is held keeps its own."""
 
