@@ -166,6 +166,16 @@ def test_a_load_beside_a_base_that_another_recording_told_is_found_with_its_mass
     assert physics.terms["added_mass"]["mass"]["value"] == pytest.approx(0.03, rel=0.1)
 
 
+def test_a_page_shows_what_is_left_from_the_moment_of_release_on(engine):
+    true = base(newtonian={"eta": 3.0})
+    late = take(true, 1)
+    points = late.points.copy()
+    points[:, 2:] = late.points[:, :-2]
+    points[:, :2] = late.points[:, :1]
+    _, _, mismatch = found([replace(late, points=points)], take(true, 2))
+    assert np.sqrt(np.nanmean(mismatch.residual_before**2)) < 1e-4
+
+
 def test_viscosity_that_was_told_at_another_pitch_may_be_another(engine):
     """Silicone loses about as much in every swing: a slower one has more viscosity than the bare body's."""
     true = base(newtonian={"eta": 4.5}, added_mass={"mass": 0.03})

@@ -149,7 +149,8 @@ def written(
     share = shares(tried, body, told)
     clip, named = body.clip, [best, *like] if pays else []
     runs = {"before": base} | ({"after": best} if pays else {})
-    moved = {k: simulate(clip, t.values, t.places, clip.frames) for k, t in runs.items()}
+    seen = courses.whole(clip)
+    moved = {k: seen.let_go(simulate(clip, t.values, t.places, clip.frames)) for k, t in runs.items()}
     errors = {"unit": "mm", "noise_floor": None, "flexible": None}
     worst = tried[-1] if pays else None
     diagnosis = Diagnosis(

@@ -18,7 +18,7 @@ def laws(f: Frame) -> list[Law]:
 
     seams = 0.3, 0.5, 0.7
     return [
-        Law("stiff_inclusion", lump, ((0.2, 4.0), ALONG), (0.06, 0.0), (16.0, 1.0), _called("place")),
+        Law("stiff_inclusion", lump, ((0.2, 4.0), ALONG), (0.06, 0.0), (16.0, 1.0), called=_called("place")),
         # The base's modulus is then the one near what is held.
-        Law("stiff_inclusion", part, ((0.4, 2.5), seams), (0.06, 0.1), (16.0, 0.95), _called("part"), 0),
+        Law("stiff_inclusion", part, ((0.4, 2.5), seams), (0.06, 0.1), (16.0, 0.95), called=_called("part"), divides=0),
     ]
